@@ -1,0 +1,33 @@
+# What we build on: Debian 12 packages, see tools/packages.
+set(CMAKE_FIND_PACKAGE_PREFER_CONFIG ON)
+set(THREADS_PREFER_PTHREAD_FLAG ON)
+find_package(Threads REQUIRED)
+find_package(Imath REQUIRED)
+find_package(fmt REQUIRED)
+find_package(TBB REQUIRED)
+find_package(OpenImageIO REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(benchmark QUIET)
+if(SQUINT_TESTS)
+  find_package(GTest REQUIRED)
+endif()
+
+# OpenImageIO 2.4.7's exported target names a folder of OpenCV that need not exist: generation would fail.
+foreach(property INTERFACE_INCLUDE_DIRECTORIES INTERFACE_SYSTEM_INCLUDE_DIRECTORIES)
+  get_target_property(folders OpenImageIO::OpenImageIO ${property})
+  if(folders)
+    list(FILTER folders EXCLUDE REGEX "opencv")
+    set_target_properties(OpenImageIO::OpenImageIO PROPERTIES ${property} "${folders}")
+  endif()
+endforeach()
+
+find_path(HIGHWAY_INCLUDE hwy/highway.h REQUIRED)
+find_library(HIGHWAY_LIBRARY hwy REQUIRED)
+add_library(squint_highway INTERFACE)
+target_include_directories(squint_highway SYSTEM INTERFACE $<BUILD_INTERFACE:${HIGHWAY_INCLUDE}>)
+target_link_libraries(squint_highway INTERFACE $<BUILD_INTERFACE:${HIGHWAY_LIBRARY}>)
+
+find_path(TEEM_INCLUDE teem/nrrd.h REQUIRED)
+find_library(TEEM_LIBRARY teem REQUIRED)
+find_path(TOMLPLUSPLUS_INCLUDE toml++/toml.h REQUIRED)

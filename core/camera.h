@@ -1,0 +1,51 @@
+// Cameras and rays in world space (CONVENTIONS.md, "Space and rays").
+#pragma once
+
+#include "core/vector.h"
+#include "core/volume.h"
+
+#include <optional>
+
+namespace squint {
+
+enum class Projection { orthographic, perspective };
+
+/// What a scene says of the camera.  Absent values are chosen so that the whole volume is in the picture.
+struct CameraSettings {
+    Projection projection = Projection::orthographic;
+    std::optional<Vec3> eye;       // overrides azimuth and elevation
+    std::optional<Vec3> center;    // default: the middle of the volume
+    std::optional<Vec3> up;        // default: z, or y where the view is along z
+    double azimuth = 30;           // degrees about z, 0 looks along +y (at the front)
+    double elevation = 15;         // degrees above the horizon
+    std::optional<double> height;  // orthographic: world units from the bottom to the top of the picture
+    double fov_y = 30;             // perspective: degrees, vertical
+    int turntable = 1;             // pictures in a full turn about `up` through `center`
+};
+
+struct Ray {
+    Vec3 origin;     // world
+    Vec3 direction;  // unit length
+};
+
+/// A camera with nothing left open.  ray() uses + - * / sqrt only: same bits everywhere.
+struct Camera {
+    Projection projection = Projection::orthographic;
+    Vec3 eye, center, view, right, up;  // view, right, up are unit and orthogonal; view points into the picture
+    double half_height = 1;             // orthographic: world units; perspective: tan(fov_y / 2)
+    int width = 1, height = 1;          // pixels
+
+    Ray ray(int column, int row) const;  // through the pixel's centre; row 0 is the top
+};
+
+/// Throws InputError: eye equals center, up parallel to the view, height or fov_y out of range.
+Camera make_camera(const CameraSettings& settings, const Volume& volume, int width, int height, int frame = 0);
+
+/// The part of a ray inside a box [low, high], as distances along it: empty when first >= last (a chord of zero is empty).
+struct Interval {
+    double first = 0, last = 0;
+    bool empty() const { return !(first < last); }
+};
+Interval intersect(const Ray& ray, const Vec3& low, const Vec3& high);
+
+}  // namespace squint

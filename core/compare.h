@@ -1,0 +1,31 @@
+// Differences between two images, channel by channel.
+#pragma once
+
+#include "core/image.h"
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace squint {
+
+/// Figures of one channel over all pixels or over the foreground (A > 0 in either image).  LSB8 = 1/255 of full scale.
+struct Difference {
+    std::string channel;
+    std::int64_t pixels = 0;
+    bool identical = false;
+    std::optional<double> psnr;  // dB, peak 1; none when identical
+    double rmse = 0, bias = 0;   // a - b
+    double largest = 0;          // |a - b|
+    int largest_x = 0, largest_y = 0;
+    std::optional<double> ssim;  // all pixels only, 11x11 Gaussian windows, sigma 1.5
+};
+struct Comparison {
+    std::vector<Difference> all, foreground;  // one a channel; the last, "RGB", joins the colours
+    const Difference& channel(const std::string& name, bool of_foreground) const;
+};
+
+/// Throws InputError when sizes or channel names differ or any value is not finite: never a pass.
+Comparison compare(const Image& a, const Image& b, bool srgb = false, bool with_ssim = true);
+
+}  // namespace squint

@@ -1,0 +1,47 @@
+// A volume: unsigned integer scalars on a regular, axis-aligned grid in world space.  Knows no bits of the pipeline.
+#pragma once
+
+#include "core/vector.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+namespace squint {
+
+enum class ScalarType : std::uint8_t { u8, u16 };  // how scalars lie in memory
+
+/// Scalars are levels: stored value minus the smallest the type or a declared window allows (CONVENTIONS.md, "Scalars").
+/// A volume is immutable and cheap to copy; its voxels are shared, in memory or mapped from a file.
+struct Volume {
+    Index3 dims{0, 0, 0};           // voxels along x, y, z; x runs fastest
+    Vec3 spacing{1, 1, 1};          // world units between voxel centres
+    Vec3 origin{0, 0, 0};           // world position of the first voxel's centre
+    ScalarType type = ScalarType::u8;
+    std::shared_ptr<const void> data;  // dims.x * dims.y * dims.z scalars of `type`, little-endian
+    std::uint32_t smallest = 0;     // least and greatest scalar in the data
+    std::uint32_t largest = 0;
+    int scalar_bits = 8;            // I: integer bits that hold every scalar of the declared range
+    double value_scale = 1;         // file's value = value_scale * scalar + value_offset (HU where declared)
+    double value_offset = 0;
+    std::string name;               // for messages: a path or a procedural name
+    std::string content_hash;       // of dims, type and voxels: names the data wherever it lies
+
+    std::int64_t voxels() const { return dims.x * dims.y * dims.z; }
+    std::size_t scalar_bytes() const { return type == ScalarType::u8 ? 1 : 2; }
+    std::uint32_t largest_representable() const { return (1u << scalar_bits) - 1; }
+
+    std::uint32_t at(std::int64_t x, std::int64_t y, std::int64_t z) const {
+        const std::int64_t index = (z * dims.y + y) * dims.x + x;
+        return type == ScalarType::u8 ? static_cast<const std::uint8_t*>(data.get())[index]
+                                      : static_cast<const std::uint16_t*>(data.get())[index];
+    }
+    double smallest_spacing() const { return std::min(spacing.x, std::min(spacing.y, spacing.z)); }
+
+    Vec3 voxel_from_world(const Vec3& p) const { return (p - origin) / spacing; }
+    Vec3 world_from_voxel(const Vec3& p) const { return origin + p * spacing; }
+};
+
+}  // namespace squint
