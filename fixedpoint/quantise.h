@@ -1,0 +1,87 @@
+// The one place where bits are lost: an exact integer with `from` fraction bits -> a wire's format.
+// Rounding first, overflow second: SystemC's semantics.
+#pragma once
+
+#include "fixedpoint/format.h"
+
+#include <algorithm>
+#include <concepts>
+#include <cstdint>
+
+namespace squint {
+
+struct WireStatistics;  // audit.h
+
+using Int128 = __int128;
+
+/// What a Spec asks of a number with `from` fraction bits, computed once per render: shift, bias and limits.
+///
+///     q = (x + bias + odd(x >> shift) * to_even + negative(x) * to_zero) >> shift,   then clamp or wrap
+struct Rescale {
+    int shift = 0;               // fraction bits lost; negative: gained, exactly
+    std::int64_t bias = 0;       // half a unit, less one for rnd_conv
+    std::int64_t to_even = 0;    // 1 for rnd_conv
+    std::int64_t to_zero = 0;    // (1 << shift) - 1 for trn_zero
+    std::int64_t lowest = 0;     // the format's limits
+    std::int64_t highest = 0;
+    int width = 0;               // for wrapping, with is_signed
+    bool is_signed = false;
+    bool wraps = false;
+    bool active = true;          // Real: round and limit, or pass through (see words.h)
+    int wire = -1;               // whose it is, for audits and traces
+    WireStatistics* statistics = nullptr;  // Audited: where to count
+    Rounding rounding = Rounding::trn;
+
+    constexpr Rescale() = default;
+    constexpr Rescale(int from_fraction_bits, const Spec& spec, int wire_index = -1)
+        : shift(from_fraction_bits - spec.format.fraction_bits),
+          lowest(spec.format.smallest()),
+          highest(spec.format.largest()),
+          width(spec.format.width()),
+          is_signed(spec.format.is_signed),
+          wraps(spec.overflow == Overflow::wrap),
+          wire(wire_index),
+          rounding(spec.rounding) {
+        if (shift <= 0) return;
+        const std::int64_t half = shift < 63 ? std::int64_t{1} << (shift - 1) : 0;
+        if (rounding == Rounding::rnd) bias = half;
+        if (rounding == Rounding::rnd_conv) bias = half - 1, to_even = 1;
+        if (rounding == Rounding::trn_zero) to_zero = 2 * half - 1;
+    }
+};
+
+template <class W>
+concept Integer = std::same_as<W, std::int64_t> || std::same_as<W, Int128>;
+
+/// Rounding alone: no limits.
+template <Integer W>
+constexpr W round_off(W x, const Rescale& to) {
+    if (to.shift <= 0) return x * (W{1} << -to.shift);
+    return (x + to.bias + ((x >> to.shift) & to.to_even) + (x < 0 ? to.to_zero : 0)) >> to.shift;
+}
+
+/// Overflow alone: saturate at the limits, or keep the lowest `width` bits.
+template <Integer W>
+constexpr W limit(W x, const Rescale& to) {
+    if (!to.wraps) return x < to.lowest ? W{to.lowest} : x > to.highest ? W{to.highest} : x;
+    const W modulus = W{1} << to.width;
+    const W low_bits = x & (modulus - 1);
+    return to.is_signed && low_bits >= modulus / 2 ? low_bits - modulus : low_bits;
+}
+
+/// Exact, then quantised once.  The result is a raw number of the wire's format.
+template <Integer W>
+[[nodiscard]] constexpr W quantise(W x, const Rescale& to) {
+    return limit(round_off(x, to), to);
+}
+
+/// A real number to a raw one: exact on the double's own bits, so that `floor(x 2^F + 1/2)`'s famous error just below a half
+/// cannot happen.  NaN gives 0; infinities and everything too large obey the overflow rule's saturation.
+std::int64_t quantise_real(double x, const Spec& spec);
+
+/// The value of a raw number.
+constexpr double to_real(std::int64_t raw, const Format& format) {
+    return static_cast<double>(raw) / static_cast<double>(format.one());
+}
+
+}  // namespace squint
