@@ -1,0 +1,387 @@
+// Procedural volumes: scalar fields over the unit cube, written once over a number type.  With doubles a
+// field gives its value, with dual numbers its exact gradient as well.
+#include "core/procedural.h"
+
+#include "core/error.h"
+#include "core/portable_math.h"
+#include "core/volume_data.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace squint {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+/// A value and its derivatives by x, y and z (forward differentiation).
+struct Dual {
+    double value = 0;
+    Vec3 slope{0, 0, 0};
+
+    Dual(double constant) : value(constant) {}  // NOLINT: numbers are dual numbers without a slope
+    Dual(double v, const Vec3& s) : value(v), slope(s) {}
+
+    friend Dual operator+(const Dual& a, const Dual& b) { return {a.value + b.value, a.slope + b.slope}; }
+    friend Dual operator-(const Dual& a, const Dual& b) { return {a.value - b.value, a.slope - b.slope}; }
+    friend Dual operator-(const Dual& a) { return {-a.value, -a.slope}; }
+    friend Dual operator*(const Dual& a, const Dual& b) {
+        return {a.value * b.value, a.slope * b.value + b.slope * a.value};
+    }
+    friend Dual operator/(const Dual& a, const Dual& b) {
+        const double value = a.value / b.value;
+        return {value, (a.slope - b.slope * value) / b.value};
+    }
+};
+
+double value_of(double x) {
+    return x;
+}
+double value_of(const Dual& x) {
+    return x.value;
+}
+
+double sqrt(double x) {
+    return std::sqrt(x);
+}
+double sin(double x) {
+    return portable::sin(x);
+}
+double cos(double x) {
+    return portable::cos(x);
+}
+/// At 0 the slope is taken as 0: every field here that meets it depends on the square alone.
+Dual sqrt(const Dual& x) {
+    const double root = std::sqrt(x.value);
+    return {root, root > 0 ? x.slope * (0.5 / root) : Vec3(0)};
+}
+Dual sin(const Dual& x) {
+    return {portable::sin(x.value), x.slope * portable::cos(x.value)};
+}
+Dual cos(const Dual& x) {
+    return {portable::cos(x.value), x.slope * -portable::sin(x.value)};
+}
+
+template <class S>
+struct Point {
+    S x, y, z;
+
+    friend Point operator-(const Point& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+    friend Point operator/(const Point& a, const Vec3& b) { return {a.x / b.x, a.y / b.y, a.z / b.z}; }
+};
+template <class S>
+S squared_length(const Point<S>& p) {
+    return p.x * p.x + p.y * p.y + p.z * p.z;
+}
+
+// --- Shapes: distances to a surface, negative inside, exact near it to first order
+// ---------------------------------------
+
+/// 0 below 0, 1 above 1, between them 6 t^5 - 15 t^4 + 10 t^3: two continuous derivatives.
+template <class S>
+S smooth_step(const S& t) {
+    if (value_of(t) <= 0) return S(0);
+    if (value_of(t) >= 1) return S(1);
+    return t * t * t * (t * (t * S(6) - S(15)) + S(10));
+}
+/// From 0 outside to 1 inside, `width` across and centred on the surface.
+template <class S>
+S inside(const S& distance, double width) {
+    return smooth_step(S(0.5) - distance / S(width));
+}
+/// The nearer of two surfaces, blended where they are less than `blend` apart (one continuous derivative).
+template <class S>
+S join(const S& a, const S& b, double blend) {
+    const S apart = (a - b) / S(blend);
+    if (value_of(apart) >= 1) return b;
+    if (value_of(apart) <= -1) return a;
+    const S closeness = S(1) - (value_of(apart) < 0 ? -apart : apart);
+    return (value_of(apart) < 0 ? a : b) - closeness * closeness * S(blend / 4);
+}
+template <class S>
+S cut(const S& a, const S& b, double blend) {  // a without b
+    return -join(-a, b, blend);
+}
+template <class S>
+S ball(const Point<S>& p, const Vec3& center, double radius) {
+    return sqrt(squared_length(p - center)) - S(radius);
+}
+/// |k| (|k| - 1) / |gradient of k|, k = p / radii: the distance to first order near the surface.
+template <class S>
+S ellipsoid(const Point<S>& p, const Vec3& center, const Vec3& radii) {
+    const Point<S> scaled = (p - center) / radii;
+    const S length = sqrt(squared_length(scaled));
+    if (value_of(length) < 1e-6)
+        return S(-std::min(radii.x, std::min(radii.y, radii.z)));  // 0 / 0 at the centre
+    return length * (length - S(1)) / sqrt(squared_length(scaled / radii));
+}
+/// A tube from a to b whose radius goes from ra to rb, with round ends.
+template <class S>
+S tube(const Point<S>& p, const Vec3& a, double ra, const Vec3& b, double rb) {
+    const Vec3 axis = b - a;
+    const Point<S> from = p - a;
+    S along = (from.x * S(axis.x) + from.y * S(axis.y) + from.z * S(axis.z)) / S(axis.dot(axis));
+    if (value_of(along) < 0) along = S(0);
+    if (value_of(along) > 1) along = S(1);
+    const Point<S> off{from.x - along * S(axis.x), from.y - along * S(axis.y), from.z - along * S(axis.z)};
+    return sqrt(squared_length(off)) - (S(ra) + along * S(rb - ra));
+}
+
+// --- The phantom: a head, x to its left, y to its back, z up; coordinates -1 to 1
+// ----------------------------------------
+
+struct Segment {
+    Vec3 a;
+    double ra;
+    Vec3 b;
+    double rb;
+};
+/// Vessels of one half of the brain: a trunk, a ring around the middle, and branches that thin out.
+constexpr int kSegments = 17;
+const std::array<Segment, kSegments>& vessel_tree() {
+    static const std::array<Segment, kSegments> tree{{
+        {{0.10, 0.02, -0.10}, .032, {0.12, -0.02, 0.06}, .030},  // carotid
+        {{0.12, -0.02, 0.06}, .028, {0.07, -0.16, 0.12}, .024},  // anterior
+        {{0.07, -0.16, 0.12}, .024, {0.05, -0.30, 0.24}, .022},
+        {{0.05, -0.30, 0.24}, .022, {0.06, -0.30, 0.42}, .018},
+        {{0.06, -0.30, 0.42}, .018, {0.06, -0.14, 0.56}, .014},
+        {{0.05, -0.30, 0.24}, .018, {0.16, -0.40, 0.30}, .012},
+        {{0.12, -0.02, 0.06}, .028, {0.24, -0.06, 0.10}, .025},  // middle
+        {{0.24, -0.06, 0.10}, .025, {0.35, 0.00, 0.18}, .022},
+        {{0.35, 0.00, 0.18}, .020, {0.38, -0.12, 0.32}, .014},
+        {{0.35, 0.00, 0.18}, .020, {0.39, 0.14, 0.30}, .016},
+        {{0.39, 0.14, 0.30}, .016, {0.30, 0.24, 0.46}, .012},
+        {{0.38, -0.12, 0.32}, .014, {0.28, -0.14, 0.50}, .011},
+        {{0.12, -0.02, 0.06}, .026, {0.11, 0.14, 0.08}, .023},  // posterior
+        {{0.11, 0.14, 0.08}, .023, {0.15, 0.32, 0.12}, .020},
+        {{0.15, 0.32, 0.12}, .020, {0.12, 0.48, 0.22}, .015},
+        {{0.15, 0.32, 0.12}, .018, {0.28, 0.42, 0.16}, .012},
+        {{0.12, 0.48, 0.22}, .015, {0.10, 0.42, 0.42}, .012},
+    }};
+    return tree;
+}
+
+template <class S>
+S vessels(const Point<S>& p) {
+    Point<S> half = p;  // the two halves mirror each other, but for an aneurysm on the left
+    if (value_of(p.x) < 0) half.x = -p.x;
+    S distance = join(ball(p, {0.25, -0.09, 0.12}, 0.055),
+                      tube(p, {-0.07, -0.16, 0.12}, .018, {0.07, -0.16, 0.12}, .018), 0.01);
+    for (const Segment& s : vessel_tree()) {
+        // Branches far away cannot reach the surface: spare their square roots.
+        const Vec3 middle = (s.a + s.b) * 0.5;
+        const double reach = (s.b - s.a).length() * 0.5 + s.ra + 0.1;
+        if (value_of(squared_length(half - middle)) > reach * reach) continue;
+        distance = join(distance, tube(half, s.a, s.ra, s.b, s.rb), 0.02);
+    }
+    return distance;
+}
+
+template <class S>
+S head_surface(const Point<S>& p) {
+    const S cranium = ellipsoid(p, {0, 0.06, 0.22}, {0.62, 0.76, 0.66});
+    const S face = ellipsoid(p, {0, -0.32, -0.25}, {0.42, 0.42, 0.56});
+    const S nose = tube(p, {0, -0.72, -0.08}, .045, {0, -0.80, -0.24}, .07);
+    const S neck = tube(p, {0, 0.14, -0.40}, .36, {0, 0.20, -1.5}, .36);
+    Point<S> half = p;
+    if (value_of(p.x) < 0) half.x = -p.x;
+    const S ear = ellipsoid(half, {0.64, 0.08, -0.02}, {0.07, 0.12, 0.17});
+    const S eye = ellipsoid(half, {0.17, -0.70, -0.08}, {0.11, 0.06, 0.06});
+    const S head = join(join(join(join(cranium, face, 0.20), neck, 0.20), nose, 0.06), ear, 0.05);
+    return cut(head, eye, 0.05);
+}
+
+template <class S>
+S skull_outside(const Point<S>& p) {
+    const S vault = ellipsoid(p, {0, 0.06, 0.22}, {0.54, 0.68, 0.58});
+    const S cheeks = ellipsoid(p, {0, -0.30, -0.16}, {0.33, 0.34, 0.36});
+    Point<S> half = p;
+    if (value_of(p.x) < 0) half.x = -p.x;
+    const S orbit = ellipsoid(half, {0.17, -0.60, -0.10}, {0.12, 0.16, 0.10});
+    const S nasal = ellipsoid(p, {0, -0.60, -0.24}, {0.065, 0.16, 0.12});
+    const S jaw = join(tube(half, {0.30, -0.08, -0.22}, .05, {0.24, -0.14, -0.50}, .045),
+                       tube(half, {0.24, -0.14, -0.50}, .045, {0.0, -0.48, -0.60}, .06), 0.05);
+    const S spine = tube(p, {0, 0.20, -0.42}, .13, {0, 0.24, -1.5}, .13);
+    const S canal = tube(p, {0, 0.26, -0.30}, .05, {0, 0.30, -1.5}, .05);
+    const S skull = cut(cut(join(vault, cheeks, 0.10), orbit, 0.02), nasal, 0.02);
+    return cut(join(join(skull, jaw, 0.02), spine, 0.04), canal, 0.02);
+}
+
+/// Levels rise inwards, air < skin < tissue < bone < brain < vessel, and every surface parts two neighbours:
+/// a transfer function that shows one of them does not meet it again in the transition between two others.
+constexpr double kSkin = 0.16, kTissue = 0.32, kBone = 0.55, kBrain = 0.72, kVessel = 0.94;
+constexpr double kEdge = 0.030;  // of 2: transitions are 2 voxels wide at 128, 4 at 256
+
+template <class S>
+S phantom(const S& x, const S& y, const S& z) {
+    const Point<S> p{x * S(2) - S(1), y * S(2) - S(1), z * S(2) - S(1)};
+    const S head = head_surface(p);
+    if (value_of(head) > kEdge) return S(0);
+    const S skin = inside(head, kEdge);
+    const S flesh = inside(head + S(0.045), kEdge);
+    S value = skin * S(kSkin) + flesh * S(kTissue - kSkin);
+    if (value_of(head) > -0.03) return value;
+
+    const S bone = skull_outside(p);
+    // Off the middle of the vault: bone is thick at the back and the base, thin at the front and the temples.
+    const S brain = ellipsoid(p, {0, 0.035, 0.235}, {0.505, 0.625, 0.535});
+    const S within_skull = inside(join(bone, brain, 1e-3), kEdge);
+    value = value + within_skull * S(kBone - kTissue);
+    if (value_of(brain) > kEdge) return value;
+    value = value + inside(brain, kEdge) * S(kBrain - kBone);
+    if (value_of(brain) > -0.03) return value;
+    return value + inside(vessels(p), kEdge) * S(kVessel - kBrain);
+}
+
+// --- The other fields
+// ----------------------------------------------------------------------------------------------------
+
+/// 1 at the centre, 0 at the distance 0.5 and beyond.
+template <class S>
+S sphere(const S& x, const S& y, const S& z) {
+    return smooth_step(S(1) - sqrt(squared_length(Point<S>{x, y, z} - Vec3(0.5))) * S(2));
+}
+
+/// Marschner and Lobb 1994, section 5: f_M = 6, alpha = 0.25, over [-1, 1]^3.
+template <class S>
+S marschner_lobb(const S& x, const S& y, const S& z) {
+    constexpr double kFrequency = 6, kAlpha = 0.25;
+    const S px = x * S(2) - S(1), py = y * S(2) - S(1), pz = z * S(2) - S(1);
+    const S radius = sqrt(px * px + py * py);
+    const S ripple = cos(cos(radius * S(kPi / 2)) * S(2 * kPi * kFrequency));
+    return (S(1) - sin(pz * S(kPi / 2)) + (S(1) + ripple) * S(kAlpha)) / S(2 * (1 + kAlpha));
+}
+
+/// Five nested shells, brighter and thinner inwards, empty between: (1 - t^2)^3 across a shell.
+template <class S>
+S shells(const S& x, const S& y, const S& z) {
+    constexpr double kRadius[] = {0.44, 0.36, 0.28, 0.20, 0.12},
+                     kHalf[] = {0.020, 0.016, 0.013, 0.010, 0.008};
+    constexpr double kLevel[] = {0.2, 0.4, 0.6, 0.8, 1.0};
+    const S radius = sqrt(squared_length(Point<S>{x, y, z} - Vec3(0.5)));
+    for (int i = 0; i < 5; ++i) {
+        const S across = (radius - S(kRadius[i])) / S(kHalf[i]);
+        const S profile = S(1) - across * across;
+        if (value_of(profile) > 0) return profile * profile * profile * S(kLevel[i]);
+    }
+    return S(0);
+}
+
+template <class S>
+S ramp(const S& x, const S&, const S&) {
+    return x;
+}
+template <class S>
+S constant(const S&, const S&, const S&) {
+    return S(0.5);
+}
+template <class S>
+S fog(const S&, const S&, const S&) {
+    return S(1.0 / 255);
+}
+
+/// (T(x) + T(y) + T(z) + 3) / 6 over [-1, 1]^3 with the cubic T(t) = 4 t^3 - 3 t: isosurfaces open, close and
+/// split.
+template <class S>
+S polynomial(const S& x, const S& y, const S& z) {
+    const auto cubic = [](const S& unit) {
+        const S t = unit * S(2) - S(1);
+        return t * (t * t * S(4) - S(3));
+    };
+    return (cubic(x) + cubic(y) + cubic(z) + S(3)) / S(6);
+}
+
+/// A generic lambda f(x, y, z) over any number type -> value and gradient.
+template <class F>
+ProceduralField field(std::string name, std::string description, int bits, std::int64_t size, F f) {
+    return {std::move(name),
+            std::move(description),
+            bits,
+            size,
+            [f](const Vec3& p) { return f(p.x, p.y, p.z); },
+            [f](const Vec3& p) {
+                return f(Dual(p.x, {1, 0, 0}), Dual(p.y, {0, 1, 0}), Dual(p.z, {0, 0, 1})).slope;
+            }};
+}
+
+}  // namespace
+
+const std::vector<ProceduralField>& procedural_fields() {
+    static const std::vector<ProceduralField> fields{
+        field("phantom", "a head: skin, fog-like tissue, a skull thick and thin, a brain with vessels", 12,
+              128, [](auto x, auto y, auto z) { return phantom(x, y, z); }),
+        field("sphere", "a smooth ball: 1 at the centre, 0 from half the side on", 12, 128,
+              [](auto x, auto y, auto z) { return sphere(x, y, z); }),
+        field("marschner_lobb", "the test signal of Marschner and Lobb, f_M = 6, alpha = 0.25", 8, 41,
+              [](auto x, auto y, auto z) { return marschner_lobb(x, y, z); }),
+        field("shells", "five thin nested shells, brighter and thinner inwards", 12, 128,
+              [](auto x, auto y, auto z) { return shells(x, y, z); }),
+        field("ramp", "x, from 0 to full scale", 8, 128,
+              [](auto x, auto y, auto z) { return ramp(x, y, z); }),
+        field("constant", "half of full scale everywhere", 8, 128,
+              [](auto x, auto y, auto z) { return constant(x, y, z); }),
+        field("fog", "1/255 of full scale everywhere: the scalar 1 at 8 bits", 8, 128,
+              [](auto x, auto y, auto z) { return fog(x, y, z); }),
+        field("polynomial", "a sum of cubics whose isosurfaces open, close and split", 8, 64,
+              [](auto x, auto y, auto z) { return polynomial(x, y, z); }),
+    };
+    return fields;
+}
+
+const ProceduralField* find_procedural(std::string_view name) {
+    for (const ProceduralField& field : procedural_fields())
+        if (field.name == name) return &field;
+    return nullptr;
+}
+
+namespace {
+
+/// The coordinate of a voxel centre in [0, 1]; the only voxel of an axis stands in the middle.
+double unit_coordinate(std::int64_t index, std::int64_t size) {
+    return size == 1 ? 0.5 : static_cast<double>(index) / static_cast<double>(size - 1);
+}
+
+template <class Scalar>
+void sample(const ProceduralField& field, const Index3& dims, double levels, Scalar* voxels) {
+    tbb::parallel_for(std::int64_t{0}, dims.z, [&](std::int64_t z) {
+        Scalar* at = voxels + z * dims.y * dims.x;
+        Vec3 p{0, 0, unit_coordinate(z, dims.z)};
+        for (std::int64_t y = 0; y < dims.y; ++y) {
+            p.y = unit_coordinate(y, dims.y);
+            for (std::int64_t x = 0; x < dims.x; ++x) {
+                p.x = unit_coordinate(x, dims.x);
+                const double value = std::clamp(field.value(p), 0.0, 1.0);
+                *at++ = static_cast<Scalar>(value * levels + 0.5);
+            }
+        }
+    });
+}
+
+}  // namespace
+
+Volume make_procedural(const ProceduralField& field, Index3 dims, int bits, const Vec3& spacing) {
+    if (bits < 1 || bits > 16)
+        throw InputError(fmt::format("{}: bits is {}, but 1 to 16 are allowed", field.name, bits));
+    check_spacing(spacing, field.name);
+    Volume volume;
+    volume.name = field.name;
+    volume.dims = dims;
+    volume.spacing = spacing;
+    volume.type = bits <= 8 ? ScalarType::u8 : ScalarType::u16;
+    volume.scalar_bits = bits;
+    const std::shared_ptr<void> voxels =
+        allocate_voxels(checked_bytes(dims, volume.scalar_bytes(), field.name), field.name);
+    const double levels = (1 << bits) - 1;
+    if (volume.type == ScalarType::u8) sample(field, dims, levels, static_cast<std::uint8_t*>(voxels.get()));
+    if (volume.type == ScalarType::u16)
+        sample(field, dims, levels, static_cast<std::uint16_t*>(voxels.get()));
+    volume.data = voxels;
+    measure(volume);
+    return volume;
+}
+
+}  // namespace squint

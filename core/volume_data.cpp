@@ -1,0 +1,142 @@
+// Memory of voxels: allocated or mapped, measured and named.
+#include "core/volume_data.h"
+
+#include "core/error.h"
+#include "core/hash.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <tbb/parallel_for.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <new>
+#include <vector>
+
+namespace squint {
+namespace {
+
+constexpr std::size_t kHugePage = std::size_t{1} << 21;
+
+[[noreturn]] void refuse(const std::string& where, int error) {
+    throw InputError(fmt::format("{}: cannot read: {}", where, std::strerror(error)));
+}
+
+/// Scalars are measured and hashed in pieces of this size, side by side; the pieces' hashes are hashed in
+/// order.
+constexpr std::size_t kPieceBytes = std::size_t{1} << 22;
+
+struct Piece {
+    std::uint32_t smallest, largest;
+    std::string hash;
+};
+
+template <class Scalar>
+Piece measure_piece(const Scalar* scalars, std::size_t count) {
+    Scalar smallest = scalars[0], largest = scalars[0];
+    for (std::size_t i = 0; i < count; ++i) {
+        smallest = std::min(smallest, scalars[i]);
+        largest = std::max(largest, scalars[i]);
+    }
+    Hasher hasher;
+    hasher.bytes(scalars, count * sizeof(Scalar));
+    return {smallest, largest, hasher.hex()};
+}
+
+}  // namespace
+
+std::shared_ptr<void> allocate_voxels(std::size_t bytes, const std::string& where) {
+    const std::align_val_t alignment{bytes >= kHugePage ? kHugePage : std::size_t{64}};
+    void* memory = ::operator new(bytes + kPaddingBytes, alignment, std::nothrow);
+    if (!memory)
+        throw InputError(fmt::format(
+            "{}: {} bytes of voxels are needed, but the system has no such memory left", where, bytes));
+    if (bytes >= kHugePage)
+        madvise(memory, bytes, MADV_HUGEPAGE);  // rays touch many pages; failure costs only time
+    std::memset(static_cast<char*>(memory) + bytes, 0, kPaddingBytes);
+    return {memory, [alignment](void* p) { ::operator delete(p, alignment); }};
+}
+
+MappedFile map_file(const std::string& path) {
+    const int file =
+        open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);  // a pipe without a writer must not block
+    if (file < 0) refuse(path, errno);
+    const std::shared_ptr<void> closer(nullptr, [file](void*) { close(file); });
+    struct stat status {};
+    if (fstat(file, &status) != 0) refuse(path, errno);
+    if (!S_ISREG(status.st_mode)) throw InputError(fmt::format("{}: cannot read: not a regular file", path));
+
+    // Zero pages first, the file over their beginning: at least one page of zeros stays behind it.
+    const std::size_t page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+    const std::size_t size = static_cast<std::size_t>(status.st_size);
+    const std::size_t reserved = (size / page + 2) * page;
+    void* memory = mmap(nullptr, reserved, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    if (memory == MAP_FAILED) refuse(path, errno);
+    std::shared_ptr<const unsigned char> bytes(static_cast<const unsigned char*>(memory),
+                                               [memory, reserved](const void*) { munmap(memory, reserved); });
+    if (size > 0 && mmap(memory, size, PROT_READ, MAP_SHARED | MAP_FIXED, file, 0) == MAP_FAILED)
+        refuse(path, errno);
+    return {std::move(bytes), size};
+}
+
+std::string text_of(const Index3& dims) {
+    return fmt::format("{}x{}x{}", dims.x, dims.y, dims.z);
+}
+
+std::size_t checked_bytes(const Index3& dims, std::size_t scalar_bytes, const std::string& where) {
+    unsigned __int128 product = scalar_bytes;
+    for (const std::int64_t size : {dims.x, dims.y, dims.z}) {
+        if (size < 1)
+            throw InputError(
+                fmt::format("{}: dimensions are {}, but each must be at least 1", where, text_of(dims)));
+        if (product < (std::uint64_t{1} << 62)) product *= static_cast<std::uint64_t>(size);
+    }
+    if (product >= (std::uint64_t{1} << 62))
+        throw InputError(fmt::format("{}: dimensions are {}, but less than 2^62 bytes of voxels are allowed",
+                                     where, text_of(dims)));
+    return static_cast<std::size_t>(product);
+}
+
+void check_spacing(const Vec3& spacing, const std::string& where) {
+    for (const double s : {spacing.x, spacing.y, spacing.z})
+        if (!std::isfinite(s) || s <= 0)
+            throw InputError(
+                fmt::format("{}: spacing is {} {} {}, but each must be finite and greater than 0", where,
+                            spacing.x, spacing.y, spacing.z));
+}
+
+int bits_for(std::uint64_t largest) {
+    return std::max(1, static_cast<int>(std::bit_width(largest)));
+}
+
+void measure(Volume& volume) {
+    const std::size_t bytes = static_cast<std::size_t>(volume.voxels()) * volume.scalar_bytes();
+    const auto* data = static_cast<const unsigned char*>(volume.data.get());
+    std::vector<Piece> pieces((bytes + kPieceBytes - 1) / kPieceBytes);
+    tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t i) {
+        const unsigned char* piece = data + i * kPieceBytes;
+        const std::size_t size = std::min(kPieceBytes, bytes - i * kPieceBytes);
+        pieces[i] = volume.type == ScalarType::u8
+                        ? measure_piece(reinterpret_cast<const std::uint8_t*>(piece), size)
+                        : measure_piece(reinterpret_cast<const std::uint16_t*>(piece), size / 2);
+    });
+    Hasher hasher;
+    for (const std::int64_t size : {volume.dims.x, volume.dims.y, volume.dims.z})
+        hasher.number(static_cast<std::uint64_t>(size));
+    hasher.number(volume.scalar_bytes());
+    volume.smallest = pieces[0].smallest, volume.largest = pieces[0].largest;
+    for (const Piece& piece : pieces) {
+        volume.smallest = std::min(volume.smallest, piece.smallest);
+        volume.largest = std::max(volume.largest, piece.largest);
+        hasher.text(piece.hash);
+    }
+    volume.content_hash = hasher.hex();
+}
+
+}  // namespace squint

@@ -1,0 +1,46 @@
+// Memory of voxels: allocated or mapped, measured and named.  For the loaders of volumes only.
+#pragma once
+
+#include "core/volume.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+namespace squint {
+
+/// Readable bytes after the last voxel, whether allocated or mapped: a wide load of the last voxel stays
+/// within bounds.
+inline constexpr std::size_t kPaddingBytes = 64;
+
+/// `bytes` uninitialised and kPaddingBytes of zeros after them.  Throws InputError naming `where` if there is
+/// no memory.
+std::shared_ptr<void> allocate_voxels(std::size_t bytes, const std::string& where);
+
+/// A whole file, read-only, with kPaddingBytes readable after it.
+struct MappedFile {
+    std::shared_ptr<const unsigned char> bytes;
+    std::size_t size = 0;
+};
+/// Throws InputError: no such file, not a regular file.  A file that shrinks while mapped ends the process
+/// (SIGBUS).
+MappedFile map_file(const std::string& path);
+
+/// x y z -> bytes, in wide arithmetic.  Throws InputError when a dimension is below 1 or the product reaches
+/// 2^62.
+std::size_t checked_bytes(const Index3& dims, std::size_t scalar_bytes, const std::string& where);
+
+/// Throws InputError when a spacing is not finite or not positive.
+void check_spacing(const Vec3& spacing, const std::string& where);
+
+/// "256x256x128".
+std::string text_of(const Index3& dims);
+
+/// Bits that hold `largest`, at least 1.
+int bits_for(std::uint64_t largest);
+
+/// Sets smallest, largest and content_hash from dims, type and data.
+void measure(Volume& volume);
+
+}  // namespace squint
