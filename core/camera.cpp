@@ -1,14 +1,14 @@
 #include "core/camera.h"
 
+#include "core/error.h"
+#include "core/portable_math.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <limits>
-
-#include "core/error.h"
-#include "core/portable_math.h"
 
 namespace squint {
 namespace {

@@ -35,7 +35,8 @@ void write_exr(const Image& image, const std::string& path, const Attributes& at
 /// R G B A premultiplied linear -> over `background` (linear) -> 8-bit sRGB PNG.  Written whole or not at all.
 void write_preview_png(const Image& image, const std::string& path, const double background[3]);
 
-/// EXR, PNG and whatever else OpenImageIO opens by its extension; floats (UINT channels as words).  Throws InputError.
+/// EXR, PNG and whatever else OpenImageIO opens by its extension.  Floats as stored, 8-bit codes as 0 to 1 without decoding;
+/// UINT channels of EXR as words.  Channels come in the order of the reader: find them by name.  Throws InputError.
 Image read_image(const std::string& path, Attributes* attributes = nullptr);
 
 }  // namespace squint

@@ -1,13 +1,13 @@
 #include "core/transfer_function.h"
 
+#include "core/error.h"
+#include "core/portable_math.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-
-#include "core/error.h"
-#include "core/portable_math.h"
 
 namespace squint {
 namespace {

@@ -1,14 +1,14 @@
 #include "core/camera.h"
 
+#include "core/error.h"
+
 #include <gmock/gmock.h>
+#include <gtest/gtest.h>
 
 #include <bit>
 #include <cmath>
 #include <limits>
 #include <random>
-
-#include "core/error.h"
-#include "gtest/gtest.h"
 
 namespace {
 

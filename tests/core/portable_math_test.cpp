@@ -1,13 +1,13 @@
 #include "core/portable_math.h"
 
+#include <gtest/gtest.h>
+
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <functional>
 #include <limits>
 #include <random>
-
-#include "gtest/gtest.h"
 
 namespace {
 

@@ -1,13 +1,13 @@
 #include "core/transfer_function.h"
 
+#include "core/error.h"
+
 #include <gmock/gmock.h>
+#include <gtest/gtest.h>
 
 #include <bit>
 #include <cmath>
 #include <limits>
-
-#include "core/error.h"
-#include "gtest/gtest.h"
 
 namespace {
 

@@ -1,0 +1,208 @@
+#include "core/image.h"
+
+#include "core/error.h"
+#include "core/srgb.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <random>
+
+namespace {
+
+using namespace squint;
+using testing::HasSubstr;
+
+/// An empty folder that goes away.
+class Folder {
+  public:
+    Folder() {
+        std::string name = testing::TempDir() + "squint_image_XXXXXX";
+        if (!mkdtemp(name.data())) throw std::runtime_error("no temporary folder");
+        path_ = name;
+    }
+    ~Folder() { std::filesystem::remove_all(path_); }
+    std::string operator/(const std::string& name) const { return (path_ / name).string(); }
+    std::size_t files() const {
+        return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(path_), {}));
+    }
+
+  private:
+    std::filesystem::path path_;
+};
+
+std::string bytes_of(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// R G B A of floats, with values that no 8-bit file holds, and two channels of words.
+Image picture(int width = 37, int height = 23) {
+    Image image{width, height, {}};
+    std::mt19937 random(5);
+    for (const char* name : {"R", "G", "B", "A", "Z", "N.x"})
+        for (float& value : image.add_float(name).values)
+            value = static_cast<float>(random()) * 0x1p-31f - 0.5f;
+    for (const char* name : {"fixed.R", "fixed.T"})
+        for (std::uint32_t& word : image.add_words(name).words) word = static_cast<std::uint32_t>(random());
+    image.find("fixed.R")->words[0] = 0xffffffffu;  // -1: read as a float it would lose bits
+    image.find("Z")->values[1] = std::numeric_limits<float>::infinity();
+    return image;
+}
+
+template <class Call>
+std::string message(const Call& call) {
+    try {
+        call();
+    } catch (const InputError& error) {
+        return error.what();
+    }
+    return "";
+}
+
+TEST(Exr, EveryFloatAndEveryWordComesBackBitForBit) {
+    const Folder folder;
+    const Image image = picture();
+    write_exr(image, folder / "a.exr", {{"squint:scene", "line one\nline two"}, {"squint:version", "0.1"}});
+    Attributes attributes;
+    const Image back = read_image(folder / "a.exr", &attributes);
+    EXPECT_EQ(back.width, image.width);
+    EXPECT_EQ(back.height, image.height);
+    ASSERT_EQ(back.channels.size(), image.channels.size());
+    for (const Channel& channel : image.channels) {
+        const Channel* found = back.find(channel.name);
+        ASSERT_TRUE(found) << channel.name;
+        EXPECT_EQ(found->is_words(), channel.is_words()) << channel.name;
+        EXPECT_EQ(found->words, channel.words) << channel.name;
+        EXPECT_EQ(found->values, channel.values) << channel.name;
+    }
+    EXPECT_EQ(attributes["squint:scene"], "line one\nline two");
+    EXPECT_EQ(attributes["squint:version"], "0.1");
+}
+
+TEST(Exr, TwoRunsAtDifferentTimesAndPlacesWriteTheSameBytes) {
+    const Folder folder;
+    write_exr(picture(), folder / "a.exr", {{"squint:scene", "x"}});
+    std::filesystem::create_directory(folder / "deeper");
+    const std::time_t started = std::time(nullptr);
+    while (std::time(nullptr) == started) {
+    }  // a stamp of the time has seconds
+    write_exr(picture(), folder / "deeper/other.exr", {{"squint:scene", "x"}});
+    EXPECT_EQ(bytes_of(folder / "a.exr"), bytes_of(folder / "deeper/other.exr"));
+    EXPECT_THAT(bytes_of(folder / "a.exr"), Not(HasSubstr("squint_image_")));
+}
+
+TEST(Exr, AFolderThatCannotBeWrittenIsNamedAndNothingRemains) {
+    const Folder folder;
+    EXPECT_THAT(message([&] { write_exr(picture(), folder / "absent/a.exr", {}); }),
+                HasSubstr("absent/a.exr"));
+    EXPECT_THAT(message([&] {
+                    write_exr(Image{3, 3, {}}, folder / "a.exr", {});
+                }),
+                HasSubstr("3 x 3 pixels of 0 channels"));
+    Image torn = picture();
+    torn.channels[2].values.pop_back();
+    EXPECT_THAT(message([&] { write_exr(torn, folder / "a.exr", {}); }),
+                HasSubstr("channel B has not 37 x 23 values"));
+    EXPECT_EQ(folder.files(), 0u);
+}
+
+TEST(Srgb, TheCurveAndItsInverseMeet) {
+    for (int i = 0; i <= 4096; ++i) {
+        const double x = i / 4096.0;
+        // The slope of decoding is at most 2.3 and pow is good to 2^-50; the standard's two pieces miss each
+        // other by 3e-8.
+        EXPECT_NEAR(linear_from_srgb(srgb_from_linear(x)), x, x > 0.00313 && x < 0.00314 ? 1e-7 : 1e-14);
+    }
+    EXPECT_EQ(srgb_from_linear(0), 0);
+    EXPECT_NEAR(srgb_from_linear(1), 1, 4e-16);
+    EXPECT_EQ(srgb_from_linear(-3), 0);
+}
+
+TEST(Preview, CodesAreTheNearestToTheSrgbCurveAndHalvesRoundUp) {
+    const Folder folder;
+    Image image{4096, 1, {}};
+    for (const char* name : {"R", "G", "B"}) {
+        float next = 0;
+        for (float& value : image.add_float(name).values) value = next++ / 4095;
+    }
+    const double black[3] = {0, 0, 0};
+    write_preview_png(image, folder / "a.png", black);
+    const Image back = read_image(folder / "a.png");
+    ASSERT_TRUE(back.find("R"));
+    for (int x = 0; x < image.width; ++x) {
+        const auto i = static_cast<std::size_t>(x);
+        const double expected = std::floor(srgb_from_linear(image.find("R")->values[i]) * 255 + 0.5);
+        EXPECT_EQ(std::lround(back.find("R")->values[i] * 255), expected) << x;
+    }
+}
+
+TEST(Preview, PutsTheBackgroundUnderPremultipliedColour) {
+    const Folder folder;
+    Image image{4, 1, {}};
+    image.add_float("A").values = {0, 0.5f, 1, 0.25f};
+    image.add_float("B").values = {0, 0, 0, 9};
+    image.add_float("G").values = {0, 0.25f, 0.5f, -9};
+    image.add_float("R").values = {0, 0.5f, 1, std::nanf("")};
+    const double background[3] = {1, 0.5, 0};
+    write_preview_png(image, folder / "a.png", background);
+    const Image back = read_image(folder / "a.png");
+    // 188 is the code of half the light: 255 * srgb(0.5) = 187.5...
+    const std::vector<int> red{255, 255, 255, 0}, green{188, 188, 188, 0}, blue{0, 0, 0, 255};
+    for (std::size_t x = 0; x < 4; ++x) {
+        EXPECT_EQ(std::lround(back.find("R")->values[x] * 255), red[x]) << x;
+        EXPECT_EQ(std::lround(back.find("G")->values[x] * 255), green[x]) << x;
+        EXPECT_EQ(std::lround(back.find("B")->values[x] * 255), blue[x]) << x;
+    }
+    EXPECT_THAT(message([&] {
+                    write_preview_png(Image{picture().width, 23, {picture().channels[3]}}, folder / "b.png",
+                                      background);
+                }),
+                HasSubstr("no channel R"));
+    EXPECT_EQ(folder.files(), 1u);
+}
+
+TEST(ReadImage, WhatCannotBeReadIsOneLineThatNamesTheFile) {
+    const Folder folder;
+    const auto refused = [&](const std::string& name) {
+        return message([&] { (void)read_image(folder / name); });
+    };
+    EXPECT_THAT(refused("absent.exr"), AllOf(HasSubstr("absent.exr"), HasSubstr("no such file")));
+    std::ofstream(folder / "a.unknown") << "text";
+    EXPECT_THAT(refused("a.unknown"), HasSubstr("extension \".unknown\" names no image format"));
+    std::ofstream(folder / "plain") << "text";
+    EXPECT_THAT(refused("plain"), HasSubstr("names no image format"));
+    std::filesystem::create_directory(folder / "folder.exr");
+    EXPECT_THAT(refused("folder.exr"), HasSubstr("it is a folder"));
+    std::ofstream(folder / "empty.exr").close();
+    EXPECT_THAT(refused("empty.exr"), HasSubstr("cannot read"));
+    std::ofstream(folder / "text.png") << "text";
+    EXPECT_THAT(refused("text.png"), AllOf(HasSubstr("text.png: cannot read"), Not(HasSubstr("\n"))));
+}
+
+TEST(ReadImage, ATornOrFlippedExrIsRefusedOrReadButNeverWorse) {
+    const Folder folder;
+    write_exr(picture(), folder / "whole.exr", {{"squint:scene", "x"}});
+    const std::string whole = bytes_of(folder / "whole.exr");
+    std::mt19937 random(3);
+    int refused = 0;
+    for (int i = 0; i < 300; ++i) {
+        std::string torn = whole;
+        if (i % 2) torn.resize(random() % whole.size());
+        for (int flip = 0; i % 2 == 0 && flip < 4; ++flip)
+            torn[random() % 600] ^= static_cast<char>(1u << random() % 8);
+        std::ofstream(folder / "torn.exr", std::ios::binary) << torn;
+        const std::string said = message([&] { (void)read_image(folder / "torn.exr"); });
+        refused += !said.empty();
+        EXPECT_THAT(said, Not(HasSubstr("\n"))) << "case " << i << " of seed 3";
+    }
+    EXPECT_GT(refused, 150) << "at least every cut file";
+}
+
+}  // namespace
