@@ -8,6 +8,8 @@
 #include "pipeline/wires.h"
 
 #include <array>
+#include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -139,7 +141,14 @@ struct Scene {
     OutputSettings output;
     PrecisionSettings precision;
     std::string folder;  // paths in the scene are relative to it
+
+    // Not settings, for messages only: the file, and where each setting was given ("head.toml:7:1", "--set").
+    std::string name;
+    std::map<std::string, std::string, std::less<>> given_at;
 };
+
+/// The same settings, as written; where they came from does not count.
+bool operator==(const Scene& a, const Scene& b);
 
 /// Calls visit(key, setting, help) for every plain setting of a scene.  `lights` is a list of tables: see visit_light().
 template <class S, class V>
@@ -229,16 +238,40 @@ Scene built_in_scene();
 /// Throws InputError `file:line:column: what, what was found, what is allowed`.
 Scene read_scene(const std::string& path, const std::vector<std::string>& overrides = {});
 Scene scene_with(Scene base, const std::vector<std::string>& overrides);
+/// The same from a text; `name` stands for the file in messages.
+Scene parse_scene(std::string_view text, const std::string& name, const std::string& folder,
+                  const std::vector<std::string>& overrides = {});
 
-/// The whole scene as key -> TOML value, every key present: what EXR attributes and records hold.
+/// Where a setting was given, to begin a message about it: "head.toml:7:8: sampling.step" or "--set sampling.step".
+std::string where(const Scene& scene, std::string_view key);
+
+/// A path as written in a setting -> the path to open: ${VARIABLE} replaced from the environment, relative to `folder`.
+/// Throws InputError beginning with `setting` where a variable is unset or empty, or ${ is not closed.
+std::string expand_path(const std::string& text, const std::string& folder, const std::string& setting);
+/// The volume's source with its path expanded, ready for load_volume().  The scene itself keeps the path as written:
+/// what is recorded names no folder of this machine.
+VolumeSource volume_source(const Scene& scene);
+
+/// The built-in precision presets.
+inline constexpr std::string_view kPrecisionPresets[] = {"default", "squeeze", "eight_bit", "wide", "real"};
+/// The precision with a preset file, if one is named, merged under the scene's own wires: `preset` is then a built-in one.
+/// A preset file is TOML with one table, [precision]: a built-in `preset` and wires.  Throws InputError.
+PrecisionSettings resolved_precision(const Scene& scene);
+
+/// The whole scene as key -> TOML value, every key present ("auto" where absent): what EXR attributes and records hold.
+/// Each pair, joined by `=`, is an override that sets the same value again.
 std::vector<std::pair<std::string, std::string>> resolved(const Scene& scene);
 /// A TOML file that reads back as the same scene.
 std::string to_toml(const Scene& scene);
 
 /// One line a setting: key, default, meaning.
 std::string scene_help();
+/// docs/scene.md: every key with its default, what is allowed and what it means.
+std::string scene_reference_markdown();
 
 /// The scene's transfer function, from points, preset or file.  Throws InputError.
 TransferFunction resolve_transfer_function(const Scene& scene);
+/// Names that `transfer_function.preset` knows: those of CT in HU, and `phantom` for the built-in volume.
+std::vector<std::string> transfer_function_presets();
 
 }  // namespace squint
