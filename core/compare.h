@@ -9,7 +9,9 @@
 
 namespace squint {
 
-/// Figures of one channel over all pixels or over the foreground (A > 0 in either image).  LSB8 = 1/255 of full scale.
+/// Figures of one channel over all pixels or over the foreground (A > 0 in either image; all pixels where
+/// there is no A). LSB8 = 1/255 of full scale.  Channels of words are compared as signed raw integers; they
+/// have no peak: no psnr, no ssim.
 struct Difference {
     std::string channel;
     std::int64_t pixels = 0;
@@ -18,14 +20,21 @@ struct Difference {
     double rmse = 0, bias = 0;   // a - b
     double largest = 0;          // |a - b|
     int largest_x = 0, largest_y = 0;
-    std::optional<double> ssim;  // all pixels only, 11x11 Gaussian windows, sigma 1.5
+    std::optional<double>
+        ssim;  // all pixels only, whole 11x11 Gaussian windows, sigma 1.5; none in smaller pictures
 };
 struct Comparison {
-    std::vector<Difference> all, foreground;  // one a channel; the last, "RGB", joins the colours
+    std::vector<Difference> all,
+        foreground;  // one a channel; the last, "RGB", joins the colours if all three are there
     const Difference& channel(const std::string& name, bool of_foreground) const;
 };
 
-/// Throws InputError when sizes or channel names differ or any value is not finite: never a pass.
+/// Throws InputError when sizes or channel names differ or any value is not finite: never a pass.  `srgb`
+/// encodes R, G and B first (below 0 is 0), for differences as a display shows them.
 Comparison compare(const Image& a, const Image& b, bool srgb = false, bool with_ssim = true);
+
+/// gain (a - b), signed, as floats; channels as in `a`.  Throws InputError when sizes or channel names
+/// differ.
+Image difference(const Image& a, const Image& b, double gain = 1);
 
 }  // namespace squint

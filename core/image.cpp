@@ -42,23 +42,15 @@ Channel& add(Image& image, std::string name) {
     return image.channels.emplace_back(Channel{std::move(name), {}, {}});
 }
 
-/// The name that OpenImageIO has for the files of this extension; empty if it knows none.  It lists
-/// "openexr:exr,sxr;png:png;...".
+/// The name that OpenImageIO has for the files of this extension; empty if it knows none.
 std::string format_of(const std::string& path) {
     std::string extension = std::filesystem::path(path).extension().string();
     std::transform(extension.begin(), extension.end(), extension.begin(),
                    [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     if (extension.size() < 2) return "";
-    const std::string list = OIIO::get_string_attribute("extension_list");
-    for (std::size_t at = 0; at < list.size();) {
-        const std::size_t end = std::min(list.find(';', at), list.size());
-        const std::string entry = list.substr(at, end - at);
-        const std::size_t colon = std::min(entry.find(':'), entry.size());
-        if (("," + entry.substr(std::min(colon + 1, entry.size())) + ",")
-                .find("," + extension.substr(1) + ",") != std::string::npos)
-            return entry.substr(0, colon);
-        at = end + 1;
-    }
+    for (const auto& [format, extensions] : OIIO::get_extension_map())
+        if (std::find(extensions.begin(), extensions.end(), extension.substr(1)) != extensions.end())
+            return format;
     return "";
 }
 
