@@ -32,7 +32,7 @@ bool in_unit_range(double x) {
 }  // false for what is not a number
 
 std::string where(const TransferFunction& function) {
-    return function.name.empty() ? "transfer function" : "transfer function " + function.name;
+    return function.name.empty() ? "transfer function" : function.name;
 }
 
 template <class Point>

@@ -9,13 +9,26 @@
 
 namespace squint {
 
-/// ct_bone, ct_skin, ct_muscle, ct_lung, ct_vessels, ... in HU; unit_distance in millimetres.
+/// ct_bone, ct_skin, ct_muscle, ct_lung, ct_vessels, ... in HU; unit_distance is 1 mm, so spacings must be in
+/// millimetres.
 std::vector<std::string> transfer_preset_names();
 bool find_transfer_preset(std::string_view name, TransferFunction& function);
 
-/// ParaView JSON colour map (RGBPoints and Points), or 3D Slicer .vp (documented subset).  `srgb` decodes colours first.
-/// Throws InputError for everything outside the subset.
+/// ParaView's JSON colour map: an object, or a list of one, with
+///     "RGBPoints": [value, r, g, b, ...]                      required
+///     "Points": [value, alpha, midpoint, sharpness, ...]      midpoint 0.5 and sharpness 0; absent: alpha
+///     rises from 0 to 1 "ColorSpace": "RGB"                                     the only one; absent means
+///     it
+/// Values are taken as they are, in the units of the volume's file: ParaView's own maps often span [0, 1] and
+/// must be rescaled there before export.  Other keys are ignored.  `srgb` decodes the points' colours. Throws
+/// InputError for the rest.
 TransferFunction import_paraview_json(const std::string& path, bool srgb, double unit_distance);
+
+/// 3D Slicer's text volume property (.vp): nine lines, empty ones apart,
+///     interpolation, shade, diffuse, ambient, specular, power   one number each; ignored, the scene says how
+///     it is lit N value alpha ...        scalar opacity: N numbers follow N value alpha ...        gradient
+///     opacity: 1 everywhere, or no points N value r g b ...        colour
+/// Slicer keeps no unit distance in it: 1, as VTK's default.  Throws InputError for the rest.
 TransferFunction import_slicer_vp(const std::string& path, bool srgb);
 
 }  // namespace squint

@@ -120,7 +120,7 @@ TEST(TransferFunction, WhatCannotBeSampledIsRefusedByName) {
     EXPECT_EQ(message(ramp()), "");
     TransferFunction f = ramp();
     f.name = "mine", f.color.clear();
-    EXPECT_EQ(message(f), "transfer function mine, colour: no points, allowed is one or more");
+    EXPECT_EQ(message(f), "mine, colour: no points, allowed is one or more");
     f = ramp(), f.opacity.clear();
     EXPECT_THAT(message(f), HasSubstr("opacity: no points"));
     f = ramp(), f.opacity[1].value = 49;

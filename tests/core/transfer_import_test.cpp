@@ -1,0 +1,236 @@
+#include "core/transfer_import.h"
+
+#include "core/error.h"
+#include "core/srgb.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <random>
+
+namespace {
+
+using namespace squint;
+using testing::HasSubstr;
+
+const std::string kParaView =
+    R"([{"ColorSpace": "RGB", "Creator": "ParaView", "Name": "two steps", "NanColor": [1, 1, 0],
+  "RGBPoints": [0, 0.25, 0, 0, 100, 0.5, 0.5, 1],
+  "Points": [0, 0, 0.5, 0, 60, 0.125, 0.5, 0, 60, 1, 0.5, 0]}])";
+
+const std::string kSlicer =
+    "1\n1\n0.9\n0.1\n0.2\n10\n"
+    "8 -3024 0 -16.5 0 641 0.72 3071 0.71\n"
+    "4 0 1 255 1\n"
+    "12 -3024 0 0 0 -16.5 0.73 0.25 0.3 641 0.9 0.8 0.56\n";
+
+/// A file of this test alone.
+class ImportTest : public testing::Test {
+  protected:
+    ImportTest() {
+        std::string name = testing::TempDir() + "squint_import_XXXXXX";
+        if (!mkdtemp(name.data())) throw std::runtime_error("no temporary folder");
+        folder_ = name;
+    }
+    ~ImportTest() override { std::filesystem::remove_all(folder_); }
+
+    std::string file(const std::string& text) {
+        std::ofstream(path(), std::ios::binary) << text;
+        return path();
+    }
+    std::string path() const { return folder_ + "/function"; }
+
+    TransferFunction paraview(const std::string& text, bool srgb = false) {
+        return import_paraview_json(file(text), srgb, 2.5);
+    }
+    TransferFunction slicer(const std::string& text, bool srgb = false) {
+        return import_slicer_vp(file(text), srgb);
+    }
+
+    /// What a refusal says after the file's name; it is one line.
+    std::string refusal(const std::function<void()>& import) {
+        try {
+            import();
+        } catch (const InputError& error) {
+            const std::string what = error.what();
+            EXPECT_THAT(what, testing::StartsWith(path()));
+            EXPECT_THAT(what, Not(HasSubstr("\n")));
+            return what.substr(path().size());
+        }
+        return "";
+    }
+    std::string paraview_refusal(const std::string& text) {
+        return refusal([&] { (void)paraview(text); });
+    }
+    std::string slicer_refusal(const std::string& text) {
+        return refusal([&] { (void)slicer(text); });
+    }
+
+  private:
+    std::string folder_;
+};
+
+std::string with(std::string text, const std::string& what, const std::string& instead) {
+    const std::size_t at = text.find(what);
+    EXPECT_NE(at, std::string::npos) << what;
+    return text.replace(at, what.size(), instead);
+}
+
+TEST_F(ImportTest, AParaViewMapKeepsItsPointsAndTakesTheUnitDistanceGiven) {
+    const TransferFunction function = paraview(kParaView);
+    const std::vector<ColorPoint> color{{0, {0.25, 0, 0}}, {100, {0.5, 0.5, 1}}};
+    const std::vector<OpacityPoint> opacity{{0, 0}, {60, 0.125}, {60, 1}};
+    EXPECT_EQ(function.color, color);
+    EXPECT_EQ(function.opacity, opacity);
+    EXPECT_EQ(function.unit_distance, 2.5);
+    EXPECT_EQ(paraview(kParaView.substr(1, kParaView.size() - 2)).color, color)
+        << "an object that is in no list";
+}
+
+TEST_F(ImportTest, AParaViewMapOfColoursAloneRisesFromClearToOpaque) {
+    const std::vector<OpacityPoint> rise{{-5, 0}, {7, 1}};
+    EXPECT_EQ(paraview(R"({"RGBPoints": [-5, 0, 0, 0, 7, 1, 1, 1]})").opacity, rise);
+}
+
+TEST_F(ImportTest, SrgbColoursAreDecodedAtThePoints) {
+    EXPECT_EQ(paraview(kParaView, true).color[1].color,
+              Vec3(linear_from_srgb(0.5), linear_from_srgb(0.5), linear_from_srgb(1)));
+    EXPECT_EQ(slicer(kSlicer, true).color[2].color,
+              Vec3(linear_from_srgb(0.9), linear_from_srgb(0.8), linear_from_srgb(0.56)));
+}
+
+TEST_F(ImportTest, AParaViewMapOutsideTheSubsetIsRefused) {
+    EXPECT_THAT(paraview_refusal(with(kParaView, "\"RGB\"", "\"Diverging\"")),
+                HasSubstr("ColorSpace \"Diverging\", allowed is \"RGB\""));
+    EXPECT_THAT(paraview_refusal(with(kParaView, "0.125, 0.5, 0", "0.125, 0.5, 1")),
+                HasSubstr("point 2: midpoint 0.5 and sharpness 1"));
+    EXPECT_THAT(paraview_refusal(with(kParaView, "0.25, 0, 0", "0.25, -0.1, 0")),
+                HasSubstr("RGBPoints, point 1: -0.1"));
+    EXPECT_THAT(paraview_refusal(with(kParaView, "0.25, 0, 0", "0.25, 0")),
+                HasSubstr("7 numbers, allowed is 4 for every point"));
+    EXPECT_THAT(paraview_refusal(with(kParaView, "60, 0.125", "160, 0.125")),
+                HasSubstr("value 60 after 160"));
+    EXPECT_THAT(paraview_refusal(with(kParaView, "60, 1", "60, 1.5")), HasSubstr("alpha 1.5"));
+    EXPECT_THAT(paraview_refusal("[]"), HasSubstr("a list of 0 colour maps"));
+    EXPECT_THAT(paraview_refusal("[{}, {}]"), HasSubstr("a list of 2 colour maps"));
+    EXPECT_THAT(paraview_refusal("7"), HasSubstr("not a ParaView colour map"));
+    EXPECT_THAT(paraview_refusal(R"({"IndexedColors": [1, 0, 0]})"), HasSubstr("there is no RGBPoints"));
+    EXPECT_THAT(paraview_refusal(R"({"RGBPoints": [0, 1, "red", 1]})"), HasSubstr("holds \"red\""));
+    EXPECT_THAT(paraview_refusal(R"({"RGBPoints": {}})"), HasSubstr("not a list"));
+    EXPECT_THAT(paraview_refusal(R"({"RGBPoints": []})"), HasSubstr("0 numbers"));
+    EXPECT_THAT(paraview_refusal(R"({"RGBPoints": [0, 1e999, 0, 0]})"), HasSubstr("not a JSON colour map"));
+    EXPECT_THAT(paraview_refusal("{\"a\n\""), HasSubstr("not a JSON colour map"));
+    EXPECT_THAT(paraview_refusal(std::string(100000, '[')), HasSubstr("not a JSON colour map"));
+}
+
+TEST_F(ImportTest, ASlicerPropertyKeepsItsPoints) {
+    const TransferFunction function = slicer(kSlicer);
+    const std::vector<ColorPoint> color{
+        {-3024, {0, 0, 0}}, {-16.5, {0.73, 0.25, 0.3}}, {641, {0.9, 0.8, 0.56}}};
+    const std::vector<OpacityPoint> opacity{{-3024, 0}, {-16.5, 0}, {641, 0.72}, {3071, 0.71}};
+    EXPECT_EQ(function.color, color);
+    EXPECT_EQ(function.opacity, opacity);
+    EXPECT_EQ(function.unit_distance, 1);
+    EXPECT_EQ(slicer(with(kSlicer, "4 0 1 255 1", "0")).opacity, opacity) << "no gradient opacity";
+    std::string dos = kSlicer;
+    for (std::size_t at = 0; (at = dos.find('\n', at)) != std::string::npos; at += 2) dos.insert(at, "\r");
+    EXPECT_EQ(slicer(dos).color, color) << "lines that end as on Windows";
+}
+
+TEST_F(ImportTest, ASlicerPropertyOutsideTheSubsetIsRefused) {
+    EXPECT_THAT(slicer_refusal(with(kSlicer, "255 1\n", "255 0.5\n")),
+                HasSubstr("gradient opacity of 0.5, allowed is 1 everywhere"));
+    EXPECT_THAT(slicer_refusal(with(kSlicer, "8 -3024", "9 -3024")),
+                HasSubstr("8 numbers, the count before them says 9"));
+    EXPECT_THAT(slicer_refusal(with(kSlicer, "8 -3024", "-8 -3024")),
+                HasSubstr("does not begin with a count"));
+    EXPECT_THAT(slicer_refusal(with(kSlicer, "8 -3024", "1e300 -3024")),
+                HasSubstr("does not begin with a count"));
+    EXPECT_THAT(slicer_refusal(with(kSlicer, "8 -3024", "nan -3024")),
+                HasSubstr("does not begin with a count"));
+    EXPECT_THAT(slicer_refusal(with(kSlicer, "8 -3024 0", "7 -3024")),
+                HasSubstr("7 numbers, allowed is 2 for every point"));
+    EXPECT_THAT(slicer_refusal(with(kSlicer, "641 0.72", "641 0,72")), HasSubstr("\"0,72"));
+    EXPECT_THAT(slicer_refusal(with(kSlicer, "641 0.72", "641 nan")),
+                HasSubstr("opacity point 3: alpha nan"));
+    EXPECT_THAT(slicer_refusal(with(kSlicer, "0.73", "73")), HasSubstr("colour, point 2: 73"));
+    EXPECT_THAT(slicer_refusal(with(kSlicer, "0.9\n0.1", "0.9 0.1")), HasSubstr("8 lines, allowed are 9"));
+    EXPECT_THAT(slicer_refusal(with(kSlicer, "0.9\n", "much\n")), HasSubstr("line 3: \"much\""));
+    EXPECT_THAT(slicer_refusal(""), HasSubstr("0 lines"));
+    EXPECT_THAT(slicer_refusal("{\"volumeProperties\": []}"), HasSubstr("a JSON volume property"));
+}
+
+TEST_F(ImportTest, MissingAndHugeFilesAreRefused) {
+    EXPECT_THAT(refusal([&] { (void)import_slicer_vp(path(), false); }), HasSubstr("cannot be opened"));
+    EXPECT_THAT(refusal([&] { (void)import_paraview_json(path(), false, 1); }),
+                HasSubstr("cannot be opened"));
+    EXPECT_THAT(slicer_refusal(std::string((16u << 20) + 1, ' ')), HasSubstr("larger than"));
+    std::filesystem::remove(path());
+    std::filesystem::create_directory(path());
+    EXPECT_THAT(refusal([&] { (void)import_slicer_vp(path(), false); }), HasSubstr("cannot be"));
+}
+
+TEST_F(ImportTest, ADamagedFileIsReadOrRefusedInOneLine) {
+    std::mt19937 random(9);
+    const std::string odd = "0123456789.,-+e[]{}\"\n \t\0nainf\xff";
+    int read = 0, refused = 0;
+    for (int i = 0; i < 500; ++i) {
+        std::string text = i % 2 ? kSlicer : kParaView;
+        for (unsigned edits = random() % 4 + 1; edits > 0; --edits) {
+            const std::size_t at = random() % text.size();
+            if (random() % 3 == 0) {
+                text.erase(at, random() % 8 + 1);
+            } else {
+                text[at] = odd[random() % odd.size()];
+            }
+            if (text.empty()) text = " ";
+        }
+        bool whole = false;
+        const std::string said = refusal([&] {
+            check(i % 2 ? slicer(text) : paraview(text));
+            whole = true;
+        });
+        EXPECT_NE(whole, !said.empty()) << "case " << i << " of seed 9";
+        (whole ? read : refused)++;
+    }
+    EXPECT_GT(read, 20);
+    EXPECT_GT(refused, 100);
+}
+
+TEST(TransferPresets, EveryPresetIsValidAndTransparentInAir) {
+    const auto names = transfer_preset_names();
+    for (const char* name : {"ct_bone", "ct_skin", "ct_muscle", "ct_lung", "ct_vessels"})
+        EXPECT_THAT(names, testing::Contains(name));
+    for (const std::string& name : names) {
+        TransferFunction function;
+        ASSERT_TRUE(find_transfer_preset(name, function)) << name;
+        EXPECT_NO_THROW(check(function)) << name;
+        EXPECT_EQ(function.alpha_at(-1000), 0) << name << " shows the air around a patient";
+        EXPECT_EQ(function.unit_distance, 1) << name;
+        EXPECT_EQ(function.name, name);
+    }
+    TransferFunction untouched;
+    untouched.name = "mine";
+    EXPECT_FALSE(find_transfer_preset("ct_nothing", untouched));
+    EXPECT_EQ(untouched.name, "mine");
+}
+
+TEST(TransferPresets, ShowWhatTheyAreNamedAfterMoreThanTheRest) {
+    struct Case {
+        const char* preset;
+        double shown, hidden;  // HU
+    };
+    for (const Case& c : {Case{"ct_bone", 1200, 50}, Case{"ct_bone_surface", 400, 200},
+                          Case{"ct_skin", 0, -600}, Case{"ct_muscle", 50, -100}, Case{"ct_lung", -600, 0},
+                          Case{"ct_vessels", 350, 1000}, Case{"ct_overview", 1000, 0}}) {
+        TransferFunction function;
+        ASSERT_TRUE(find_transfer_preset(c.preset, function));
+        EXPECT_GT(function.alpha_at(c.shown), 2 * function.alpha_at(c.hidden)) << c.preset;
+    }
+}
+
+}  // namespace
