@@ -102,17 +102,13 @@ std::string explained(std::string message, const std::string& temporary, const s
     return message;
 }
 
-void write_bytes(const std::string& path, std::string_view bytes) {
-    const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    if (file < 0) refuse(path, errno);
-    int error = 0;
-    while (!bytes.empty() && !error) {
+int write_bytes(int file, std::string_view bytes) {  // 0 or an error's number
+    while (!bytes.empty()) {
         const ssize_t written = ::write(file, bytes.data(), bytes.size());
+        if (written < 0 && errno != EINTR) return errno;
         if (written > 0) bytes.remove_prefix(static_cast<std::size_t>(written));
-        if (written < 0 && errno != EINTR) error = errno;
     }
-    if (close(file) != 0 && !error) error = errno;
-    if (error) refuse(path, error);
+    return 0;
 }
 
 }  // namespace
@@ -141,7 +137,19 @@ void write_whole(const std::string& path, const std::function<void(const std::st
 }
 
 void write_text_whole(const std::string& path, std::string_view text) {
-    write_whole(path, [&](const std::string& temporary) { write_bytes(temporary, text); });
+    write_parts_whole(path, {text});
+}
+
+void write_parts_whole(const std::string& path, std::initializer_list<std::string_view> parts) {
+    write_whole(path, [&](const std::string& temporary) {
+        const int file = open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+        if (file < 0) refuse(temporary, errno);
+        int error = 0;
+        for (auto part = parts.begin(); part != parts.end() && !error; ++part)
+            error = write_bytes(file, *part);
+        if (close(file) != 0 && !error) error = errno;
+        if (error) refuse(temporary, error);
+    });
 }
 
 void remove_temporaries() noexcept {

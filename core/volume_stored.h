@@ -1,0 +1,46 @@
+// Voxels as a file stores them -> a volume of levels.  For the loaders of volumes only.
+#pragma once
+
+#include "core/volume_data.h"
+#include "core/volume_source.h"
+
+#include <array>
+#include <optional>
+
+namespace squint {
+
+enum class StoredType { u8, i16, u16, f32 };
+std::size_t bytes_of(StoredType type);
+
+/// What a header says, and the bytes it speaks of.
+struct StoredVolume {
+    std::string where;  // the file, for messages
+    StoredType type = StoredType::u8;
+    bool big_endian = false;
+    Index3 dims{0, 0, 0};                             // along the file's axes, the fastest first
+    std::array<int, 3> axis{0, 1, 2};                 // the file's axis that lies along world x, y, z
+    std::array<bool, 3> flipped{};                    // that axis runs against its world axis
+    Vec3 spacing{1, 1, 1};                            // along world x, y, z
+    Vec3 origin{0, 0, 0};                             // world position of the voxel with the least x, y, z
+    std::optional<double> value_scale, value_offset;  // declared in the file; a scene's own go before them
+    int scalar_bits = 0;                              // declared in the file, or 0
+
+    std::shared_ptr<const unsigned char> bytes;  // mapped from the file, or
+    std::shared_ptr<unsigned char> inflated;     // in memory of our own, which may be changed in place
+
+    std::size_t voxels() const { return static_cast<std::size_t>(dims.x * dims.y * dims.z); }
+    std::size_t size() const { return voxels() * bytes_of(type); }
+    bool reordered() const { return axis != std::array{0, 1, 2} || flipped != std::array<bool, 3>{}; }
+};
+
+/// "256x256x128 of 16 bits needs 16777216".
+std::string needs(const StoredVolume& stored);
+
+/// Throws InputError when `bytes` of memory are more than the limit.
+void check_memory(std::size_t bytes, const StoredVolume& stored, const LoadLimits& limits);
+
+/// Converts to levels, or takes the bytes as they are where they are levels already; measures.
+Volume levels_from_stored(const StoredVolume& stored, const VolumeSource& source, const LoadLimits& limits,
+                          std::vector<std::string>& notes);
+
+}  // namespace squint

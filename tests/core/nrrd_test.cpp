@@ -1,0 +1,565 @@
+#include "core/procedural.h"
+#include "tests/core/volume_files.h"
+
+#include <teem/nrrd.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+namespace squint {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::StartsWith;
+
+/// A header of 4x3x2 voxels, to be changed line by line.
+struct Header {
+    std::string type = "uchar", sizes = "4 3 2", encoding = "raw", more = "";
+    std::string text() const {
+        return "NRRD0004\n# a comment\ntype: " + type + "\ndimension: 3\nsizes: " + sizes +
+               "\nencoding: " + encoding + "\nendian: little\n" + more + "\n";
+    }
+};
+const std::string k24Bytes = bytes_of_values(counting<std::uint8_t>(24));
+
+class Nrrd : public VolumeFiles {};
+
+// --- What is read
+// ----------------------------------------------------------------------------------------------------------
+
+TEST_F(Nrrd, RawBytesAreTheScalars) {
+    const Volume volume = load_path(file("a.nrrd", Header{.more = "spacings: 1 0.5 2\n"}.text() + k24Bytes));
+    EXPECT_EQ(volume.dims, Index3(4, 3, 2));
+    EXPECT_EQ(volume.spacing, Vec3(1, 0.5, 2));
+    EXPECT_EQ(volume.type, ScalarType::u8);
+    EXPECT_EQ(volume.scalar_bits, 8);
+    EXPECT_EQ(volume.smallest, 0u);
+    EXPECT_EQ(volume.largest, 23u);
+    EXPECT_EQ(scalars_of(volume), counting<std::uint32_t>(24));
+}
+
+TEST_F(Nrrd, GzipDetachedAndLineEndsOfDosGiveTheSameVolume) {
+    const std::string hash = load_path(file("a.nrrd", Header{}.text() + k24Bytes)).content_hash;
+    EXPECT_EQ(load_path(file("b.nrrd", Header{.encoding = "gzip"}.text() + gzip(k24Bytes))).content_hash,
+              hash);
+    EXPECT_EQ(load_path(file("c.nrrd", Header{.encoding = "gzip"}.text() + gzip(k24Bytes.substr(0, 7)) +
+                                           gzip(k24Bytes.substr(7))))
+                  .content_hash,
+              hash);
+
+    std::filesystem::create_directory(folder / "data");
+    file("data/voxels.raw", k24Bytes);
+    file("voxels.raw.gz", gzip(k24Bytes));
+    EXPECT_EQ(load_path(file("d.nhdr", Header{.more = "data file: data/voxels.raw\n"}.text())).content_hash,
+              hash);
+    EXPECT_EQ(
+        load_path(file("e.nhdr", Header{.encoding = "gzip", .more = "datafile: ./voxels.raw.gz\n"}.text()))
+            .content_hash,
+        hash);
+
+    std::string dos;
+    for (const char c : Header{}.text()) dos += c == '\n' ? std::string("\r\n") : std::string(1, c);
+    EXPECT_EQ(load_path(file("f.nrrd", dos + k24Bytes)).content_hash, hash);
+}
+
+TEST_F(Nrrd, SkipsLinesAndBytes) {
+    const auto with = [&](const std::string& more, const std::string& data, const char* encoding = "raw") {
+        return scalars_of(
+            load_path(file("a.nrrd", Header{.encoding = encoding, .more = more}.text() + data)));
+    };
+    const std::vector<std::uint32_t> expected = counting<std::uint32_t>(24);
+    EXPECT_EQ(with("line skip: 2\n", "one\ntwo\n" + k24Bytes), expected);
+    EXPECT_EQ(with("byte skip: 5\n", "12345" + k24Bytes), expected);
+    EXPECT_EQ(with("byte skip: -1\n", "anything" + k24Bytes), expected);
+    EXPECT_EQ(with("byte skip: 5\n", gzip("12345" + k24Bytes), "gzip"), expected);
+}
+
+TEST_F(Nrrd, BothByteOrdersGiveTheSameVolume) {
+    const auto values = counting<std::uint16_t>(24);
+    std::string big = Header{.type = "ushort"}.text();
+    big.replace(big.find("little"), 6, "big");
+    const Volume a = load_path(file("a.nrrd", Header{.type = "ushort"}.text() + bytes_of_values(values)));
+    const Volume b = load_path(file("b.nrrd", big + bytes_of_values(values, true)));
+    EXPECT_EQ(a.content_hash, b.content_hash);
+    EXPECT_EQ(a.type, ScalarType::u16);
+}
+
+TEST_F(Nrrd, SignedDataStartAtTheirMeasuredLeast) {
+    std::vector<std::int16_t> values(24, -1000);
+    values[5] = -1024, values[6] = 2000;
+    const std::string path = file("a.nrrd", Header{.type = "short"}.text() + bytes_of_values(values));
+    const Volume volume = load_path(path);
+    EXPECT_EQ(volume.smallest, 0u);
+    EXPECT_EQ(volume.largest, 3024u);
+    EXPECT_EQ(volume.scalar_bits, 12);
+    EXPECT_EQ(volume.value_scale * volume.at(2, 1, 0) + volume.value_offset, 2000);
+    EXPECT_EQ(load_path(file("b.nrrd", Header{.type = "short", .encoding = "gzip"}.text() +
+                                           gzip(bytes_of_values(values))))
+                  .content_hash,
+              volume.content_hash);
+}
+
+TEST_F(Nrrd, TheFullSignedRangeFits) {
+    std::vector<std::int16_t> values(24, 0);
+    values[0] = -32768, values[23] = 32767;
+    const Volume volume = load_path(file("a.nrrd", Header{.type = "short"}.text() + bytes_of_values(values)));
+    EXPECT_EQ(volume.largest, 65535u);
+    EXPECT_EQ(volume.scalar_bits, 16);
+    EXPECT_EQ(volume.value_offset, -32768);
+}
+
+TEST_F(Nrrd, AWindowClampsAndSaysSo) {
+    std::vector<std::int16_t> values(24, 0);
+    values[0] = -3000, values[1] = -1000, values[2] = 1000, values[3] = 5000;
+    VolumeSource source{.file = file("a.nrrd", Header{.type = "short"}.text() + bytes_of_values(values)),
+                        .window = {-1000, 3000}};
+    const Volume volume = load(source);
+    EXPECT_THAT((std::vector{volume.at(0, 0, 0), volume.at(1, 0, 0), volume.at(2, 0, 0), volume.at(3, 0, 0)}),
+                ElementsAre(0u, 0u, 2000u, 4000u));
+    EXPECT_EQ(volume.scalar_bits, 12);
+    EXPECT_EQ(volume.value_offset, -1000);
+    EXPECT_THAT(notes_of(source),
+                ElementsAre(HasSubstr("2 of 24 voxels lie outside the window [-1000, 3000]")));
+
+    source.value_scale = 0.5,
+    source.value_offset = -500;  // the window is in these units: stored values -1000 to 7000
+    EXPECT_EQ(load(source).value_offset, -1000);
+    EXPECT_EQ(load(source).scalar_bits, 13);
+    EXPECT_EQ(load(source).at(3, 0, 0), 6000u);
+}
+
+TEST_F(Nrrd, BitsFollowTheDataAndStartAtEight) {
+    const auto bits_with = [&](std::uint16_t largest) {
+        std::vector<std::uint16_t> values(24, 0);
+        values[7] = largest;
+        return load_path(file("a.nrrd", Header{.type = "ushort"}.text() + bytes_of_values(values)))
+            .scalar_bits;
+    };
+    EXPECT_EQ(bits_with(3), 8);
+    EXPECT_EQ(bits_with(255), 8);
+    EXPECT_EQ(bits_with(256), 9);
+    EXPECT_EQ(bits_with(3272), 12);
+    EXPECT_EQ(bits_with(4096), 13);
+    EXPECT_EQ(bits_with(65535), 16);
+}
+
+TEST_F(Nrrd, FloatsAreRoundedToTheLevelsOfTheirWindow) {
+    std::vector<float> values(24, 0.0f);
+    values[0] = -1, values[1] = 1, values[2] = 0.5f, values[3] = 0.499f, values[4] = 2, values[5] = -7;
+    const VolumeSource source{
+        .file = file("a.nrrd", Header{.type = "float"}.text() + bytes_of_values(values)),
+        .window = {-1, 1},
+        .bits = 2};
+    const Volume volume =
+        load(source);  // levels at -1, -1/3, 1/3, 1: 0.5 lies nearest to 1/3; 0 half-way goes up
+    EXPECT_EQ(volume.scalar_bits, 2);
+    EXPECT_EQ(volume.value_offset, -1);
+    EXPECT_EQ(volume.value_scale, 2.0 / 3);
+    const std::vector<std::uint32_t> scalars = scalars_of(volume);
+    EXPECT_THAT((std::vector(scalars.begin(), scalars.begin() + 7)), ElementsAre(0u, 3u, 2u, 2u, 3u, 0u, 2u));
+    EXPECT_THAT(notes_of(source), ElementsAre(HasSubstr("float voxels were quantised to 2 bits over [-1, 1]"),
+                                              HasSubstr("2 of 24 voxels lie outside the window")));
+}
+
+// --- Geometry
+// --------------------------------------------------------------------------------------------------------------
+
+TEST_F(Nrrd, DirectionsGiveSpacingAndOrigin) {
+    const Volume volume = load_path(file(
+        "a.nrrd", Header{.more = "space: left-posterior-superior\nspace directions: (0.5,0,0) (0,0.75,0) "
+                                 "(0,0,2)\nspace origin: (-10,20,3.5)\n"}
+                          .text() +
+                      k24Bytes));
+    EXPECT_EQ(volume.spacing, Vec3(0.5, 0.75, 2));
+    EXPECT_EQ(volume.origin, Vec3(-10, 20, 3.5));
+}
+
+// Every permutation and flip of the axes: the voxel that the file puts at a world position is found at that
+// position.
+TEST_F(Nrrd, PermutedAndFlippedAxesLandWhereTheHeaderSays) {
+    std::array<int, 3> order{0, 1, 2};
+    do {
+        for (int flips = 0; flips < 8; ++flips) {
+            std::string directions = "space dimension: 3\nspace directions:";
+            Vec3 direction[3];
+            for (int axis = 0; axis < 3; ++axis) {
+                direction[axis] = Vec3(0);
+                direction[axis][order[axis]] = (flips >> axis & 1 ? -1 : 1) * (axis + 1.0);
+                directions += " (" + std::to_string(direction[axis].x) + "," +
+                              std::to_string(direction[axis].y) + "," + std::to_string(direction[axis].z) +
+                              ")";
+            }
+            const VolumeSource source{
+                .file = file("a.nrrd",
+                             Header{.more = directions + "\nspace origin: (10,20,30)\n"}.text() + k24Bytes)};
+            const Volume volume = load(source);
+            for (int i = 0; i < 24; ++i) {
+                const Vec3 world = Vec3(10, 20, 30) + direction[0] * (i % 4) + direction[1] * (i / 4 % 3) +
+                                   direction[2] * (i / 12);
+                const Vec3 voxel = volume.voxel_from_world(world);  // exact: small integers
+                EXPECT_EQ(volume.at(std::int64_t(voxel.x), std::int64_t(voxel.y), std::int64_t(voxel.z)),
+                          unsigned(i))
+                    << directions;
+            }
+            const bool plain = flips == 0 && order == std::array{0, 1, 2};
+            EXPECT_EQ(notes_of(source).size(), plain ? 0u : 1u) << directions;
+        }
+    } while (std::next_permutation(order.begin(), order.end()));
+}
+
+TEST_F(Nrrd, AxisMinsAreTheOrigin) {
+    const Volume nodes =
+        load_path(file("a.nrrd", Header{.more = "spacings: 2 2 2\naxis mins: 1 2 3\n"}.text() + k24Bytes));
+    EXPECT_EQ(nodes.origin, Vec3(1, 2, 3));
+    const Volume cells = load_path(file(
+        "b.nrrd",
+        Header{.more = "spacings: 2 2 2\naxis mins: 1 2 3\ncenters: cell cell cell\n"}.text() + k24Bytes));
+    EXPECT_EQ(cells.origin, Vec3(2, 3, 4));
+}
+
+TEST_F(Nrrd, ALeftHandedSpaceIsNoted) {
+    const std::string more = "space: left-anterior-superior\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n";
+    EXPECT_THAT(notes_of({.file = file("a.nrrd", Header{.more = more}.text() + k24Bytes)}),
+                ElementsAre(HasSubstr("left-handed")));
+}
+
+// --- What is refused
+// -------------------------------------------------------------------------------------------------------
+
+TEST_F(Nrrd, RefusesWhatIsNoNrrd) {
+    EXPECT_THAT(refusal_of((folder / "none.nrrd").string()),
+                HasSubstr("none.nrrd: cannot read: No such file or directory"));
+    EXPECT_EQ(refusal_of(folder.string()), folder.string() + ": cannot read: not a regular file");
+    EXPECT_EQ(refusal_of(file("a.nrrd", "P5 2 2")), "a.nrrd: no NRRD: the file does not begin with \"NRRD\"");
+    EXPECT_EQ(refusal_of(file("a.nrrd", "")), "a.nrrd: no NRRD: the file does not begin with \"NRRD\"");
+    EXPECT_THAT(refusal_of(file("a.nrrd", "NRRD0004\ntype: uchar\n")),
+                HasSubstr("without the blank line that ends it"));
+    EXPECT_THAT(refusal_of(file("a.nrrd", "NRRD0004\n# \0\n\n" + std::string(1, '\0') + "\n\n")),
+                StartsWith("a.nrrd: NRRD header"));
+    EXPECT_THAT(refusal_of(file("a.nrrd", "NRRD0004\n" + std::string(3 << 20, 'x'))),
+                HasSubstr("without the blank line"));
+}
+
+TEST_F(Nrrd, RefusesTypesOutsideTheList) {
+    for (const char* type : {"int8", "int", "unsigned int", "longlong", "double"})
+        EXPECT_THAT(refusal_of(file("a.nrrd", Header{.type = type}.text() + k24Bytes)),
+                    HasSubstr("but uchar, short, ushort and float are allowed"));
+    EXPECT_THAT(refusal_of(file("a.nrrd", Header{.type = "u12"}.text() + k24Bytes)),
+                StartsWith("a.nrrd: NRRD header: "));
+    EXPECT_THAT(refusal_of(file("a.nrrd", Header{.encoding = "hex"}.text() + k24Bytes)),
+                HasSubstr("encoding is hex, but raw and gzip are allowed"));
+}
+
+TEST_F(Nrrd, RefusesDimensionsThatCannotBe) {
+    EXPECT_EQ(refusal_of(file(
+                  "a.nrrd", "NRRD0004\ntype: uchar\ndimension: 2\nsizes: 4 6\nencoding: raw\n\n" + k24Bytes)),
+              "a.nrrd: dimension is 2, but 3 is allowed");
+    EXPECT_EQ(
+        refusal_of(file("a.nrrd",
+                        "NRRD0004\ntype: uchar\ndimension: 4\nsizes: 1 4 3 2\nencoding: raw\n\n" + k24Bytes)),
+        "a.nrrd: dimension is 4, but 3 is allowed");
+    EXPECT_THAT(refusal_of(file("a.nrrd", Header{.sizes = "4 0 2"}.text() + k24Bytes)),
+                StartsWith("a.nrrd: NRRD header: parsing sizes"));
+    EXPECT_THAT(refusal_of(file("a.nrrd", Header{.sizes = "4 -3 2"}.text() + k24Bytes)),
+                StartsWith("a.nrrd: "));
+    EXPECT_THAT(
+        refusal_of(file("a.nrrd", Header{.sizes = "4294967296 4294967296 4294967296"}.text() + k24Bytes)),
+        HasSubstr("too large"));
+    EXPECT_THAT(
+        refusal_of(
+            file("a.nrrd", Header{.type = "ushort", .sizes = "2147483648 2147483648 1"}.text() + k24Bytes)),
+        HasSubstr("less than 2^62 bytes of voxels are allowed"));
+}
+
+TEST_F(Nrrd, RefusesDataOfAnotherSize) {
+    EXPECT_EQ(refusal_of(file("a.nrrd", Header{}.text() + k24Bytes.substr(1))),
+              "a.nrrd: 23 bytes of voxels after the first 89, but 4x3x2 of 8 bits needs 24");
+    EXPECT_THAT(refusal_of(file("a.nrrd", Header{}.text() + k24Bytes + "xx")),
+                HasSubstr("26 bytes of voxels after the first 89, but 4x3x2 of 8 bits needs 24: oversized"));
+    EXPECT_EQ(refusal_of(file("a.nrrd", Header{.encoding = "gzip"}.text() + gzip(k24Bytes.substr(4)))),
+              "a.nrrd: 20 bytes of voxels, but 4x3x2 of 8 bits needs 24");
+    EXPECT_EQ(refusal_of(file("a.nrrd", Header{.encoding = "gzip"}.text() + gzip(k24Bytes + "x"))),
+              "a.nrrd: more than 24 bytes of voxels, but 4x3x2 of 8 bits needs 24");
+    const std::string packed = gzip(k24Bytes);
+    EXPECT_THAT(
+        refusal_of(file("a.nrrd", Header{.encoding = "gzip"}.text() + packed.substr(0, packed.size() / 2))),
+        HasSubstr("bytes of voxels, but 4x3x2 of 8 bits needs 24"));
+    EXPECT_THAT(refusal_of(file("a.nrrd", Header{.more = "byte skip: 1000\n"}.text() + k24Bytes)),
+                HasSubstr(": 0 bytes of voxels"));
+    EXPECT_THAT(refusal_of(file("a.nrrd", Header{.more = "line skip: 9\n"}.text() + k24Bytes)),
+                HasSubstr("line skip reaches past the end"));
+    EXPECT_THAT(
+        refusal_of(file("a.nrrd", Header{.encoding = "gzip", .more = "byte skip: 30\n"}.text() + packed)),
+        HasSubstr("byte skip is 30, but the data end before"));
+    EXPECT_THAT(
+        refusal_of(file("a.nrrd", Header{.encoding = "gzip", .more = "byte skip: -1\n"}.text() + packed)),
+        HasSubstr("must not be negative"));
+}
+
+TEST_F(Nrrd, RefusesDamagedGzip) {
+    std::string packed = gzip(std::string(1000, 'a') + k24Bytes);
+    packed[12] = static_cast<char>(packed[12] ^ 0xff);
+    EXPECT_THAT(refusal_of(file("a.nrrd", Header{.sizes = "32 32 1", .encoding = "gzip"}.text() + packed)),
+                HasSubstr("gzip data are damaged"));
+    EXPECT_THAT(refusal_of(file("a.nrrd", Header{.encoding = "gzip"}.text() + k24Bytes)),
+                HasSubstr("gzip data are damaged"));
+}
+
+TEST_F(Nrrd, RefusesAGzipBombBeforeItTakesMemory) {
+    const std::string bomb = gzip(std::string(50 << 20, 0));  // 50 MiB in about 50 kB
+    EXPECT_EQ(refusal_of(file("a.nrrd", Header{.encoding = "gzip"}.text() + bomb)),
+              "a.nrrd: more than 24 bytes of voxels, but 4x3x2 of 8 bits needs 24");
+    EXPECT_THAT(refusal_of(file("b.nrrd", Header{.sizes = "100000 100000 100", .encoding = "gzip"}.text() +
+                                              gzip(k24Bytes))),
+                HasSubstr("bytes of gzip data hold at most"));
+    const VolumeSource source{
+        .file = file("c.nrrd", Header{.sizes = "1024 1024 50", .encoding = "gzip"}.text() + bomb)};
+    EXPECT_EQ(refusal(source, {.max_bytes = 50 << 10}),
+              "c.nrrd: 1024x1024x50 needs 52428800 bytes of memory, but 51200 are allowed");
+    EXPECT_EQ(refusal(source), "no refusal");
+}
+
+TEST_F(Nrrd, CopiesCountAgainstTheMemoryLimitAndMappedVoxelsDoNot) {
+    const std::string values = bytes_of_values(counting<std::uint16_t>(24));
+    EXPECT_EQ(refusal({.file = file("a.nrrd", Header{.type = "short"}.text() + values)}, {.max_bytes = 40}),
+              "a.nrrd: 4x3x2 needs 48 bytes of memory, but 40 are allowed");
+    EXPECT_EQ(
+        refusal({.file = file("b.nrrd", Header{.more = "# pad\n"}.text() + k24Bytes)}, {.max_bytes = 0}),
+        "no refusal");
+}
+
+TEST_F(Nrrd, RefusesHeadersThatPointElsewhere) {
+    file("voxels.raw", k24Bytes);
+    std::filesystem::create_directory(folder / "sub");
+    const auto with = [&](const std::string& name) {
+        return refusal_of(file("sub/a.nhdr", Header{.more = "data file: " + name + "\n"}.text()));
+    };
+    for (const std::string name : {"../voxels.raw", "x/../../voxels.raw", "..", "/etc/passwd"})
+        EXPECT_EQ(with(name), "sub/a.nhdr: data file is \"" + name +
+                                  "\", but only files in the header's own folder or below are allowed");
+    EXPECT_THAT(with("LIST"), HasSubstr("data in several files are not supported"));
+    EXPECT_THAT(with("slice%03d.raw 1 2 1"), HasSubstr("data in several files are not supported"));
+    EXPECT_THAT(with("x.raw\ndata file: y.raw"), HasSubstr("data file is named twice"));
+    EXPECT_THAT(with(" "), HasSubstr("data file is named by nothing"));
+    EXPECT_THAT(with("none.raw"), HasSubstr("sub/none.raw: cannot read: No such file or directory"));
+    EXPECT_THAT(with("."), HasSubstr("not a regular file"));
+}
+
+TEST_F(Nrrd, RefusesSpacingsThatCannotBe) {
+    const auto with = [&](const std::string& more) {
+        return refusal_of(file("a.nrrd", Header{.more = more + "\n"}.text() + k24Bytes));
+    };
+    EXPECT_EQ(with("spacings: 1 nan 1"),
+              "a.nrrd: spacing is 1 nan 1, but each must be finite and greater than 0");
+    EXPECT_EQ(with("spacings: 1 1 -2"),
+              "a.nrrd: spacing is 1 1 -2, but each must be finite and greater than 0");
+    EXPECT_THAT(with("spacings: 0 1 1"), StartsWith("a.nrrd: NRRD header: parsing spacings"));
+    EXPECT_THAT(with("spacings: inf 1 1"), StartsWith("a.nrrd: "));
+    EXPECT_THAT(with("space dimension: 3\nspace directions: (1,0,0) (0,nan,0) (0,0,1)"),
+                StartsWith("a.nrrd: "));
+    EXPECT_THAT(with("space dimension: 3\nspace directions: (1,0,0) (0,0,0) (0,0,1)"),
+                HasSubstr("space direction of axis 1 is (0,0,0), but must be finite and not zero"));
+    EXPECT_THAT(with("space dimension: 3\nspace directions: none (0,1,0) (0,0,1)"), StartsWith("a.nrrd: "));
+    EXPECT_THAT(
+        with("space dimension: 3\nspace directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (nan,0,0)"),
+        StartsWith("a.nrrd: "));
+    EXPECT_EQ(refusal({.file = file("a.nrrd", Header{}.text() + k24Bytes), .spacing = {1, 0, 1}}),
+              "a.nrrd: spacing is 1 0 1, but each must be finite and greater than 0");
+    EXPECT_EQ(refusal({.file = file("a.nrrd", Header{}.text() + k24Bytes), .spacing = {1}}),
+              "a.nrrd: spacing has 1 numbers, but needs three");
+}
+
+TEST_F(Nrrd, RefusesObliqueAxesByName) {
+    const auto with = [&](const std::string& directions) {
+        return refusal_of(file(
+            "a.nrrd",
+            Header{.more = "space dimension: 3\nspace directions: " + directions + "\n"}.text() + k24Bytes));
+    };
+    EXPECT_EQ(with("(1,0,0) (0,0.9,0.1) (0,0,1)"),
+              "a.nrrd: axis 1 is oblique, its space direction is (0,0.9,0.1), but only axes along x, y or z "
+              "are allowed");
+    EXPECT_THAT(with("(1,0,0) (1,0,0) (0,0,1)"), StartsWith("a.nrrd: "));
+    EXPECT_EQ(with("(1,0,1e-6) (0,1,0) (0,0,1)"), "no refusal");  // rounding of a writer
+    EXPECT_EQ(
+        refusal_of(file(
+            "a.nrrd",
+            Header{.more = "space dimension: 2\nspace directions: (1,0) (0,1) none\n"}.text() + k24Bytes)),
+        "a.nrrd: space dimension is 2, but 3 is allowed");
+}
+
+TEST_F(Nrrd, RefusesDirectionsBeforeTheirSpace) {
+    const std::string message = refusal_of(file(
+        "a.nrrd",
+        Header{.more = "space directions: (1,0,0) (0,1,0) (0,0,1)\nspace dimension: 3\n"}.text() + k24Bytes));
+    EXPECT_THAT(message, HasSubstr("space directions"));
+    EXPECT_THAT(message, HasSubstr("don't yet have a valid space dimension"));
+}
+
+TEST_F(Nrrd, RefusesFloatsWithoutWindowBitsOrFiniteness) {
+    std::vector<float> values(24, 0.0f);
+    const std::string path = file("a.nrrd", Header{.type = "float"}.text() + bytes_of_values(values));
+    const std::string rule = " missing: float data need window = [least, greatest] and bits = 1 to 16";
+    EXPECT_EQ(refusal_of(path), "a.nrrd: float voxels, but window and bits are" + rule);
+    EXPECT_EQ(refusal({.file = path, .bits = 8}), "a.nrrd: float voxels, but window is" + rule);
+    EXPECT_EQ(refusal({.file = path, .window = {0, 1}}), "a.nrrd: float voxels, but bits is" + rule);
+    EXPECT_EQ(refusal({.file = path, .window = {0, 1}, .bits = 17}),
+              "a.nrrd: bits is 17, but 1 to 16 are allowed");
+    EXPECT_EQ(refusal({.file = path, .window = {1, 1}, .bits = 8}),
+              "a.nrrd: window is [1, 1], but needs two finite numbers, the least first");
+    EXPECT_EQ(refusal({.file = path, .window = {1}, .bits = 8}),
+              "a.nrrd: window has 1 numbers, but needs two: [least, greatest]");
+
+    values[17] = std::numeric_limits<float>::infinity();
+    values[13] = std::numeric_limits<float>::quiet_NaN();
+    EXPECT_EQ(refusal({.file = file("b.nrrd", Header{.type = "float"}.text() + bytes_of_values(values)),
+                       .window = {0, 1},
+                       .bits = 8}),
+              "b.nrrd: voxel (1, 0, 1) is nan, but every voxel must be finite");
+}
+
+TEST_F(Nrrd, RefusesWindowsScalesAndBitsThatCannotBe) {
+    const std::string path =
+        file("a.nrrd", Header{.type = "short"}.text() + bytes_of_values(std::vector<std::int16_t>(24, 300)));
+    EXPECT_EQ(refusal({.file = path, .window = {-50000, 50000}}),
+              "a.nrrd: window [-50000, 50000] spans 100001 stored values, but 2 to 65536 are allowed");
+    EXPECT_THAT(refusal({.file = path, .window = {0.1, 0.2}}), HasSubstr("spans 1 stored values"));
+    EXPECT_THAT(refusal({.file = path, .window = {0, std::numeric_limits<double>::quiet_NaN()}}),
+                HasSubstr("needs two finite numbers"));
+    EXPECT_EQ(refusal({.file = path, .value_scale = 0}),
+              "a.nrrd: value scale is 0 and offset 0, but both must be finite and the scale not 0");
+    EXPECT_EQ(refusal({.file = path, .window = {0, 4095}, .bits = 10}),
+              "a.nrrd: bits is 10, but scalars to 4095 need 12");
+    EXPECT_EQ(refusal({.file = path, .dims = {4, 3, 2}, .type = "i16"}),
+              "a.nrrd: dims and type are for raw files, but this is a NRRD and says its own");
+}
+
+// --- Round trips
+// -------------------------------------------------------------------------------------------------------------
+
+TEST_F(Nrrd, ASavedVolumeComesBackWhole) {
+    Volume volume = make_procedural(*find_procedural("sphere"), {9, 7, 5}, 12, {0.1, 1.0 / 3, 2});
+    volume.origin = {-1.25, 1e-7, 1e6};
+    volume.value_scale = 0.1, volume.value_offset = -1024;
+    const std::string path = (folder / "a.nrrd").string();
+    save_nrrd(volume, path);
+    const Volume back = load_path(path);
+    EXPECT_EQ(back.dims, volume.dims);
+    EXPECT_EQ(back.spacing, volume.spacing);
+    EXPECT_EQ(back.origin, volume.origin);
+    EXPECT_EQ(back.type, volume.type);
+    EXPECT_EQ(back.scalar_bits, volume.scalar_bits);
+    EXPECT_EQ(back.value_scale, volume.value_scale);
+    EXPECT_EQ(back.value_offset, volume.value_offset);
+    EXPECT_EQ(back.smallest, volume.smallest);
+    EXPECT_EQ(back.largest, volume.largest);
+    EXPECT_EQ(back.content_hash, volume.content_hash);
+    EXPECT_THAT(notes_of({.file = path}), IsEmpty());
+    EXPECT_EQ(refusal({.file = path}, {.max_bytes = 0}), "no refusal");  // mapped: saved voxels are aligned
+    EXPECT_EQ(load({.file = path, .value_scale = 2}).value_scale,
+              2);  // a scene's own units go before the file's
+}
+
+TEST_F(Nrrd, OthersReadWhatWeSave) {
+    Volume volume = make_procedural(*find_procedural("marschner_lobb"), {6, 5, 4}, 16, {0.5, 0.75, 2});
+    volume.origin = {1, 2, 3};
+    const std::string path = (folder / "a.nrrd").string();
+    save_nrrd(volume, path);
+    ::Nrrd* theirs = nrrdNew();
+    ASSERT_EQ(nrrdLoad(theirs, path.c_str(), nullptr), 0);
+    EXPECT_EQ(theirs->type, nrrdTypeUShort);
+    for (int axis = 0; axis < 3; ++axis) {
+        EXPECT_EQ(theirs->axis[axis].size, static_cast<std::size_t>(volume.dims[axis]));
+        EXPECT_EQ(theirs->axis[axis].spaceDirection[axis], volume.spacing[axis]);
+        EXPECT_EQ(theirs->spaceOrigin[axis], volume.origin[axis]);
+    }
+    EXPECT_EQ(std::memcmp(theirs->data, volume.data.get(), 6 * 5 * 4 * 2), 0);
+    nrrdNuke(theirs);
+}
+
+TEST_F(Nrrd, RefusesASavedScaleThatIsNoNumber) {
+    EXPECT_EQ(refusal_of(file("a.nrrd", Header{.more = "squint value scale:=much\n"}.text() + k24Bytes)),
+              "a.nrrd: \"squint value scale\" must be a finite number");
+    EXPECT_EQ(refusal_of(file("a.nrrd", Header{.more = "squint scalar bits:=99\n"}.text() + k24Bytes)),
+              "a.nrrd: \"squint scalar bits\" is 99, but 1 to 16 are allowed");
+    EXPECT_EQ(refusal_of(file("a.nrrd", Header{.more = "squint scalar bits:=4\n"}.text() + k24Bytes)),
+              "a.nrrd: bits is 4, but scalars to 23 need 5");
+}
+
+// --- Hostile headers
+// -----------------------------------------------------------------------------------------------------------
+
+/// One change to a header: a byte, a number, a line taken out, doubled or moved, or the end cut off.
+std::string mutated(std::string text, std::mt19937& random) {
+    const auto below = [&](std::size_t n) {
+        return std::uniform_int_distribution<std::size_t>(0, n - 1)(random);
+    };
+    static const char* const kNumbers[] = {
+        "-1",   "0", "1e308", "nan", "-inf", "99999999999999999999", "2147483648", "65536",
+        "none", "(", ",",     "%d",  ""};
+    for (std::size_t changes = 1 + below(4); changes > 0 && !text.empty(); --changes) {
+        const std::size_t at = below(text.size());
+        const std::size_t line = text.rfind('\n', at) + 1,
+                          next = std::min(text.find('\n', at), text.size() - 1) + 1;
+        switch (below(7)) {
+            case 0:
+                text[at] = static_cast<char>(below(256));
+                break;
+            case 1:
+                text[at] = static_cast<char>(text[at] ^ (1 << below(8)));
+                break;
+            case 2:
+                text.insert(at, kNumbers[below(std::size(kNumbers))]);
+                break;
+            case 3:
+                text.erase(line, next - line);
+                break;
+            case 4:
+                text.insert(line, text.substr(line, next - line));
+                break;
+            case 5:
+                text.erase(at, 1 + below(8));
+                break;
+            case 6: {
+                const std::string moved = text.substr(line, next - line);
+                text.erase(line, next - line);
+                text.insert(text.rfind('\n', below(text.size() + 1)) + 1, moved);
+            }
+        }
+    }
+    return text;
+}
+
+TEST_F(Nrrd, AHostileHeaderGivesAVolumeOrOneLine) {
+    const std::string more =
+        "space: left-posterior-superior\nspace directions: (0.5,0,0) (0,-0.75,0) (0,0,2)\nspace origin: "
+        "(1,2,3)\n"
+        "kinds: domain domain domain\nbyte skip: 0\nline skip: 0\nspace units: \"mm\" \"mm\" "
+        "\"mm\"\nkey:=value\n";
+    const std::string raw = Header{.type = "short", .more = more}.text() + k24Bytes + k24Bytes;
+    const std::string packed =
+        Header{.encoding = "gzip", .more = "spacings: 1 2 3\naxis mins: 0 0 0\nlabels: \"x\" \"y\" \"z\"\n"}
+            .text() +
+        gzip(k24Bytes);
+    int volumes = 0, refusals = 0;
+    for (unsigned seed = 0; seed < 6000; ++seed) {
+        std::mt19937 random(seed);
+        const std::string bytes = mutated(seed % 2 ? raw : packed, random);
+        try {
+            load_volume({.file = file("a.nrrd", bytes)}, {.max_bytes = 1 << 20});
+            ++volumes;
+        } catch (const InputError& error) {
+            const std::string message = error.what();
+            EXPECT_EQ(message.find('\n'), std::string::npos) << "seed " << seed << ": " << message;
+            EXPECT_THAT(message, StartsWith(folder.string())) << "seed " << seed;
+            ++refusals;
+        }
+    }
+    EXPECT_GT(volumes, 500);
+    EXPECT_GT(refusals, 500);
+}
+
+}  // namespace
+}  // namespace squint
