@@ -30,4 +30,5 @@ target_link_libraries(squint_highway INTERFACE $<BUILD_INTERFACE:${HIGHWAY_LIBRA
 
 find_path(TEEM_INCLUDE teem/nrrd.h REQUIRED)
 find_library(TEEM_LIBRARY teem REQUIRED)
+find_library(ZLIB_LIBRARY z REQUIRED)
 find_path(TOMLPLUSPLUS_INCLUDE toml++/toml.h REQUIRED)
