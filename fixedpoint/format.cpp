@@ -38,7 +38,8 @@ bool value_of(const Table& table, std::string_view text, Value& out) {
 // One or two digits at `position`; -1 if there are none.
 int small_number(std::string_view text, std::size_t& position) {
     int value = -1;
-    for (int digits = 0; digits < 2 && position < text.size() && std::isdigit(static_cast<unsigned char>(text[position]));
+    for (int digits = 0;
+         digits < 2 && position < text.size() && std::isdigit(static_cast<unsigned char>(text[position]));
          ++digits)
         value = (value < 0 ? 0 : value) * 10 + (text[position++] - '0');
     return value;
@@ -49,8 +50,12 @@ int small_number(std::string_view text, std::size_t& position) {
 std::string to_string(const Format& f) {
     return fmt::format("{}{}.{}", f.is_signed ? 's' : 'u', f.integer_bits, f.fraction_bits);
 }
-std::string to_string(Rounding rounding) { return name_of(kRoundings, rounding); }
-std::string to_string(Overflow overflow) { return name_of(kOverflows, overflow); }
+std::string to_string(Rounding rounding) {
+    return name_of(kRoundings, rounding);
+}
+std::string to_string(Overflow overflow) {
+    return name_of(kOverflows, overflow);
+}
 std::string to_string(const Spec& s) {
     return fmt::format("{} {} {}", to_string(s.format), to_string(s.rounding), to_string(s.overflow));
 }
@@ -58,8 +63,9 @@ std::string to_string(const Spec& s) {
 std::string parse_format(std::string_view text, Format& out) {
     const auto refuse = [&] {
         return fmt::format(
-            "'{}' is not a format: write u or s, 0 to {} integer bits, a point, 0 to {} fraction bits, as in u1.15", text,
-            kMostIntegerBits, kMostFractionBits);
+            "'{}' is not a format: write u or s, 0 to {} integer bits, a point, 0 to {} fraction bits, as in "
+            "u1.15",
+            text, kMostIntegerBits, kMostFractionBits);
     };
     if (text.size() < 4 || (text[0] != 'u' && text[0] != 's')) return refuse();
     std::size_t position = 1;
@@ -95,10 +101,13 @@ std::string parse_spec(std::string_view text, Spec& out) {
         ++count;
         if (value_of(kRoundings, word, spec.rounding) || value_of(kOverflows, word, spec.overflow)) continue;
         if (const std::string wrong = parse_format(word, spec.format); !wrong.empty())
-            return fmt::format("'{}' is not a format, a rounding (trn, trn_zero, rnd, rnd_conv) or an overflow rule (sat, wrap)",
-                               word);
+            return fmt::format(
+                "'{}' is not a format, a rounding (trn, trn_zero, rnd, rnd_conv) or an overflow rule (sat, "
+                "wrap)",
+                word);
     }
-    if (count == 0 || count > 3) return fmt::format("'{}': expected a format, then a rounding, then an overflow rule", text);
+    if (count == 0 || count > 3)
+        return fmt::format("'{}': expected a format, then a rounding, then an overflow rule", text);
     out = spec;
     return {};
 }

@@ -18,17 +18,17 @@ using Int128 = __int128;
 ///
 ///     q = (x + bias + odd(x >> shift) * to_even + negative(x) * to_zero) >> shift,   then clamp or wrap
 struct Rescale {
-    int shift = 0;               // fraction bits lost; negative: gained, exactly
-    std::int64_t bias = 0;       // half a unit, less one for rnd_conv
-    std::int64_t to_even = 0;    // 1 for rnd_conv
-    std::int64_t to_zero = 0;    // (1 << shift) - 1 for trn_zero
-    std::int64_t lowest = 0;     // the format's limits
+    int shift = 0;             // fraction bits lost; negative: gained, exactly
+    std::int64_t bias = 0;     // half a unit, less one for rnd_conv
+    std::int64_t to_even = 0;  // 1 for rnd_conv
+    std::int64_t to_zero = 0;  // (1 << shift) - 1 for trn_zero
+    std::int64_t lowest = 0;   // the format's limits
     std::int64_t highest = 0;
-    int width = 0;               // for wrapping, with is_signed
+    int width = 0;  // for wrapping, with is_signed
     bool is_signed = false;
     bool wraps = false;
-    bool active = true;          // Real: round and limit, or pass through (see words.h)
-    int wire = -1;               // whose it is, for audits and traces
+    bool active = true;                    // Real: round and limit, or pass through (see words.h)
+    int wire = -1;                         // whose it is, for audits and traces
     WireStatistics* statistics = nullptr;  // Audited: where to count
     Rounding rounding = Rounding::trn;
 
@@ -75,8 +75,9 @@ template <Integer W>
     return limit(round_off(x, to), to);
 }
 
-/// A real number to a raw one: exact on the double's own bits, so that `floor(x 2^F + 1/2)`'s famous error just below a half
-/// cannot happen.  NaN gives 0; infinities and everything too large obey the overflow rule's saturation.
+/// A real number to a raw one: exact on the double's own bits, so that `floor(x 2^F + 1/2)`'s famous error
+/// just below a half cannot happen.  NaN gives 0; infinities and everything too large obey the overflow
+/// rule's saturation.
 std::int64_t quantise_real(double x, const Spec& spec);
 
 /// The value of a raw number.

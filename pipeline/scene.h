@@ -1,5 +1,5 @@
-// A scene: everything that decides a picture.  Each setting is written once, in visit(): reading, help, the record in the
-// EXR and --set all walk that list.
+// A scene: everything that decides a picture.  Each setting is written once, in visit(): reading, help, the
+// record in the EXR and --set all walk that list.
 #pragma once
 
 #include "core/camera.h"
@@ -33,10 +33,10 @@ enum class LayoutRule { automatic, linear, cells };
 /// The names of an enumeration's values, in order.  Specialised below for each enumeration a scene can name.
 template <class E>
 struct EnumNames;
-#define SQUINT_NAMES(E, ...)                                                 \
-    template <>                                                              \
-    struct EnumNames<E> {                                                    \
-        static constexpr std::string_view names[] = {__VA_ARGS__};           \
+#define SQUINT_NAMES(E, ...)                                       \
+    template <>                                                    \
+    struct EnumNames<E> {                                          \
+        static constexpr std::string_view names[] = {__VA_ARGS__}; \
     }
 SQUINT_NAMES(Projection, "orthographic", "perspective");
 SQUINT_NAMES(PositionRule, "p0_kv", "accumulate");
@@ -74,8 +74,8 @@ struct ImageSettings {
 };
 
 struct SamplingSettings {
-    double step = 1;                         // in units of the smallest voxel spacing
-    double termination = 1.0 / 1024;         // a ray ends at T below this; 0 never ends it early
+    double step = 1;                  // in units of the smallest voxel spacing
+    double termination = 1.0 / 1024;  // a ray ends at T below this; 0 never ends it early
     PositionRule position = PositionRule::p0_kv;
     InterpolationRule interpolation = InterpolationRule::trilinear;
 };
@@ -102,11 +102,11 @@ struct ShadingSettings {
 
 struct ClassificationSettings {
     Method method = Method::pc;
-    int order = 1;                 // n of pips and leg
-    int table_size = 256;          // of pi2d, a side
+    int order = 1;         // n of pips and leg
+    int table_size = 256;  // of pi2d, a side
     TableLookup lookup = TableLookup::bilinear;
     AlphaEncoding encoding = AlphaEncoding::alpha;
-    bool opaque_prediction = true; // for experiments only: without it thin opaque surfaces are lost
+    bool opaque_prediction = true;  // for experiments only: without it thin opaque surfaces are lost
 };
 
 struct CompositingSettings {
@@ -115,16 +115,17 @@ struct CompositingSettings {
 };
 
 struct OutputSettings {
-    bool depth = false;    // Z of the first hit and Z.mean, weighted by opacity; world units from the eye plane
-    bool normals = false;  // N.x N.y N.z of the first hit
-    bool samples = false;  // samples composited
+    bool depth = false;  // Z of the first hit and Z.mean, weighted by opacity; world units from the eye plane
+    bool normals = false;       // N.x N.y N.z of the first hit
+    bool samples = false;       // samples composited
     bool transparency = false;  // T
-    bool fixed = false;    // fixed.R ... : the raw words
+    bool fixed = false;         // fixed.R ... : the raw words
 };
 
 struct PrecisionSettings {
-    std::string preset = "default";                          // default, squeeze, eight_bit, wide, real, or a preset file
-    std::array<std::optional<std::string>, kWires> override_;  // "u1.15 trn sat", by wire; parts may be left out
+    std::string preset = "default";  // default, squeeze, eight_bit, wide, real, or a preset file
+    std::array<std::optional<std::string>, kWires>
+        override_;  // "u1.15 trn sat", by wire; parts may be left out
 };
 
 struct Scene {
@@ -150,7 +151,8 @@ struct Scene {
 /// The same settings, as written; where they came from does not count.
 bool operator==(const Scene& a, const Scene& b);
 
-/// Calls visit(key, setting, help) for every plain setting of a scene.  `lights` is a list of tables: see visit_light().
+/// Calls visit(key, setting, help) for every plain setting of a scene.  `lights` is a list of tables: see
+/// visit_light().
 template <class S, class V>
 void visit_scene(S& scene, V&& visit) {
     auto& volume = scene.volume;
@@ -173,7 +175,8 @@ void visit_scene(S& scene, V&& visit) {
     visit("transfer_function.preset", tf.preset, "built-in function by name: ct_bone, ct_skin, ...");
     visit("transfer_function.file", tf.file, "ParaView .json colour map or Slicer .vp");
     visit("transfer_function.color_space", tf.color_space, "linear, or srgb: colours are decoded first");
-    visit("transfer_function.unit_distance", tf.unit_distance, "world units of matter that an alpha is given for (required)");
+    visit("transfer_function.unit_distance", tf.unit_distance,
+          "world units of matter that an alpha is given for (required)");
     visit("transfer_function.entries", tf.entries, "samples of the function; 0: one per level, at most 4096");
     auto& camera = scene.camera;
     visit("camera.projection", camera.projection, "orthographic or perspective");
@@ -182,7 +185,8 @@ void visit_scene(S& scene, V&& visit) {
     visit("camera.up", camera.up, "up in the picture; default: z, or y where the view is along z");
     visit("camera.azimuth", camera.azimuth, "degrees about z; 0 looks along +y");
     visit("camera.elevation", camera.elevation, "degrees above the horizon");
-    visit("camera.height", camera.height, "orthographic: world units from bottom to top; default: all of the volume");
+    visit("camera.height", camera.height,
+          "orthographic: world units from bottom to top; default: all of the volume");
     visit("camera.fov_y", camera.fov_y, "perspective: vertical field of view in degrees");
     visit("camera.turntable", camera.turntable, "pictures in a full turn");
     visit("image.width", scene.image.width, "pixels");
@@ -204,23 +208,29 @@ void visit_scene(S& scene, V&& visit) {
     visit("shading.power", shading.power, "squaring, parabola or table");
     visit("shading.two_sided", shading.two_sided, "light both sides of a surface");
     auto& classification = scene.classification;
-    visit("classification.method", classification.method, "pc, pc_mid, pi2d, pi2d_no_attenuation, pi1d, pi1d_engel, pips or leg");
+    visit("classification.method", classification.method,
+          "pc, pc_mid, pi2d, pi2d_no_attenuation, pi1d, pi1d_engel, pips or leg");
     visit("classification.order", classification.order, "n of pips (1 to 5) and leg (2 to 4)");
     visit("classification.table_size", classification.table_size, "entries a side of pi2d, 64 to 4096");
     visit("classification.lookup", classification.lookup, "pi2d: bilinear or nearest");
-    visit("classification.encoding", classification.encoding, "alpha or sqrt_alpha, stored in table_alpha's format");
-    visit("classification.opaque_prediction", classification.opaque_prediction, "find opaque values inside a slab");
+    visit("classification.encoding", classification.encoding,
+          "alpha or sqrt_alpha, stored in table_alpha's format");
+    visit("classification.opaque_prediction", classification.opaque_prediction,
+          "find opaque values inside a slab");
     visit("compositing.mode", scene.compositing.mode, "over, mip, minip or average");
-    visit("compositing.form", scene.compositing.form, "w, equation_9, alpha, back_to_front, unit255_shift or unit255_blinn");
+    visit("compositing.form", scene.compositing.form,
+          "w, equation_9, alpha, back_to_front, unit255_shift or unit255_blinn");
     visit("output.depth", scene.output.depth, "channels Z and Z.mean");
     visit("output.normals", scene.output.normals, "channels N.x N.y N.z");
     visit("output.samples", scene.output.samples, "channel samples");
     visit("output.transparency", scene.output.transparency, "channel T");
     visit("output.fixed", scene.output.fixed, "channels fixed.R fixed.G fixed.B fixed.T: the raw words");
-    visit("precision.preset", scene.precision.preset, "default, squeeze, eight_bit, wide, real or a preset file");
+    visit("precision.preset", scene.precision.preset,
+          "default, squeeze, eight_bit, wide, real or a preset file");
     for (int i = 0; i < kWires; ++i) {
         const auto& wire = kWireInfo[static_cast<std::size_t>(i)];
-        visit("precision." + std::string(wire.name), scene.precision.override_[static_cast<std::size_t>(i)], wire.meaning);
+        visit("precision." + std::string(wire.name), scene.precision.override_[static_cast<std::size_t>(i)],
+              wire.meaning);
     }
 }
 
@@ -242,24 +252,27 @@ Scene scene_with(Scene base, const std::vector<std::string>& overrides);
 Scene parse_scene(std::string_view text, const std::string& name, const std::string& folder,
                   const std::vector<std::string>& overrides = {});
 
-/// Where a setting was given, to begin a message about it: "head.toml:7:8: sampling.step" or "--set sampling.step".
+/// Where a setting was given, to begin a message about it: "head.toml:7:8: sampling.step" or "--set
+/// sampling.step".
 std::string where(const Scene& scene, std::string_view key);
 
-/// A path as written in a setting -> the path to open: ${VARIABLE} replaced from the environment, relative to `folder`.
-/// Throws InputError beginning with `setting` where a variable is unset or empty, or ${ is not closed.
+/// A path as written in a setting -> the path to open: ${VARIABLE} replaced from the environment, relative to
+/// `folder`. Throws InputError beginning with `setting` where a variable is unset or empty, or ${ is not
+/// closed.
 std::string expand_path(const std::string& text, const std::string& folder, const std::string& setting);
-/// The volume's source with its path expanded, ready for load_volume().  The scene itself keeps the path as written:
-/// what is recorded names no folder of this machine.
+/// The volume's source with its path expanded, ready for load_volume().  The scene itself keeps the path as
+/// written: what is recorded names no folder of this machine.
 VolumeSource volume_source(const Scene& scene);
 
 /// The built-in precision presets.
 inline constexpr std::string_view kPrecisionPresets[] = {"default", "squeeze", "eight_bit", "wide", "real"};
-/// The precision with a preset file, if one is named, merged under the scene's own wires: `preset` is then a built-in one.
-/// A preset file is TOML with one table, [precision]: a built-in `preset` and wires.  Throws InputError.
+/// The precision with a preset file, if one is named, merged under the scene's own wires: `preset` is then a
+/// built-in one. A preset file is TOML with one table, [precision]: a built-in `preset` and wires.  Throws
+/// InputError.
 PrecisionSettings resolved_precision(const Scene& scene);
 
-/// The whole scene as key -> TOML value, every key present ("auto" where absent): what EXR attributes and records hold.
-/// Each pair, joined by `=`, is an override that sets the same value again.
+/// The whole scene as key -> TOML value, every key present ("auto" where absent): what EXR attributes and
+/// records hold. Each pair, joined by `=`, is an override that sets the same value again.
 std::vector<std::pair<std::string, std::string>> resolved(const Scene& scene);
 /// A TOML file that reads back as the same scene.
 std::string to_toml(const Scene& scene);

@@ -13,11 +13,13 @@ enum class Wire : int {
     location,              // 1  sample position in voxels, per axis
     direction,             //    step vector V in voxels, per axis
     weight,                //    interpolation weight: the location's fraction, 1.0 exists
+    length,                //    length of a slab in steps: one, but for a ray's last slab
     lerp_x,                // 2  first lerp level
     lerp_y,                //    second lerp level
     sample,                //    third lerp level: the interpolated scalar
     gradient_lerp,         // 3  first and second lerp level of a gradient
     gradient,              //    raw gradient, levels per smallest voxel spacing
+    spacing,               //    smallest voxel spacing over the axis's own
     normal,                //    normalised gradient
     classification_input,  // 4  the scalar in table entries
     table_color,           //    colours of the entries
@@ -49,11 +51,13 @@ inline constexpr std::array<WireInfo, kWires> kWireInfo{{
     {"location", "sample location", "sample position in voxels"},
     {"direction", "sample location", "step vector V in voxels"},
     {"weight", "sample location", "interpolation weight"},
+    {"length", "sample location", "length of a slab in steps"},
     {"lerp_x", "interpolation", "first lerp level"},
     {"lerp_y", "interpolation", "second lerp level"},
     {"sample", "interpolation", "interpolated scalar"},
     {"gradient_lerp", "gradient", "first and second lerp level of a gradient"},
     {"gradient", "gradient", "raw gradient, levels per smallest spacing"},
+    {"spacing", "gradient", "smallest spacing over the axis's own"},
     {"normal", "gradient", "normalised gradient"},
     {"classification_input", "classification", "scalar in table entries"},
     {"table_color", "classification", "colours of the entries"},
@@ -83,6 +87,8 @@ struct WireSpecs {
     constexpr bool operator==(const WireSpecs&) const = default;
 };
 
-constexpr const WireInfo& info(Wire w) { return kWireInfo[static_cast<std::size_t>(w)]; }
+constexpr const WireInfo& info(Wire w) {
+    return kWireInfo[static_cast<std::size_t>(w)];
+}
 
 }  // namespace squint

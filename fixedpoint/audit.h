@@ -1,0 +1,34 @@
+// What a wire carried: counted by the Audited word, printed by `--audit` and `squint pixel`.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+namespace squint {
+
+/// One value arriving on a wire.
+struct TraceEvent {
+    int wire = -1;
+    double exact = 0;      // before quantising, in units of the wire's last bit
+    std::int64_t raw = 0;  // after
+};
+
+struct WireStatistics {
+    std::int64_t count = 0, inexact = 0, saturated = 0, wrapped = 0;
+    std::int64_t smallest = std::numeric_limits<std::int64_t>::max();
+    std::int64_t largest = std::numeric_limits<std::int64_t>::min();
+    std::array<std::int64_t, 64> magnitude{};  // [b]: values whose absolute raw value needs b bits
+    std::vector<TraceEvent>* trace = nullptr;  // every event too, when wanted
+
+    void merge(const WireStatistics& other) {
+        count += other.count, inexact += other.inexact, saturated += other.saturated,
+            wrapped += other.wrapped;
+        if (other.smallest < smallest) smallest = other.smallest;
+        if (other.largest > largest) largest = other.largest;
+        for (std::size_t b = 0; b < magnitude.size(); ++b) magnitude[b] += other.magnitude[b];
+    }
+};
+
+}  // namespace squint

@@ -1,0 +1,134 @@
+// Interval arithmetic on words: proves how wide a stage's exact results are.
+#include "fixedpoint/words.h"
+
+namespace squint {
+
+thread_local WordNeeds Range::needs;
+thread_local std::uint64_t Range::limited = 0;
+
+namespace {
+
+constexpr Int128 kFar = Int128{1} << 126;  // stands for anything wider than 127 bits
+Int128 cap(Int128 x) {
+    return x > kFar ? kFar : x < -kFar ? -kFar : x;
+}
+
+int bits_of(Int128 x) {  // sign bit included
+    const Int128 magnitude = x < 0 ? -(x + 1) : x;
+    return static_cast<int>(bit_length(magnitude)) + 1;
+}
+Int128 product(Int128 a, Int128 b) {
+    Int128 result;
+    if (__builtin_mul_overflow(a, b, &result)) return (a < 0) == (b < 0) ? kFar : -kFar;
+    return cap(result);
+}
+void note_operands(Range a, Range b) {
+    Range::needs.operand_bits = std::max({Range::needs.operand_bits, signed_bits(a), signed_bits(b)});
+}
+Range spanning(std::initializer_list<Int128> values) {
+    return {std::min(values), std::max(values)};
+}
+
+}  // namespace
+
+int signed_bits(Range x) {
+    return std::max(bits_of(x.low), bits_of(x.high));
+}
+
+Range noted(Range result) {
+    result = {cap(result.low), cap(result.high)};
+    Range::needs.result_bits = std::max(Range::needs.result_bits, signed_bits(result));
+    return result;
+}
+Range operator+(Range a, Range b) {
+    return noted({a.low + b.low, a.high + b.high});
+}
+Range operator-(Range a, Range b) {
+    return noted({a.low - b.high, a.high - b.low});
+}
+Range operator*(Range a, Range b) {
+    note_operands(a, b);
+    return noted(spanning(
+        {product(a.low, b.low), product(a.low, b.high), product(a.high, b.low), product(a.high, b.high)}));
+}
+Range shift_left(Range x, int bits) {
+    const Int128 factor = Int128{1} << bits;
+    return noted({product(x.low, factor), product(x.high, factor)});
+}
+Range floor_shift(Range x, int bits) {
+    return {x.low >> bits, x.high >> bits};
+}
+Range min(Range a, Range b) {
+    return {std::min(a.low, b.low), std::min(a.high, b.high)};
+}
+Range max(Range a, Range b) {
+    return {std::max(a.low, b.low), std::max(a.high, b.high)};
+}
+Range absolute(Range x) {
+    const Int128 high = std::max(x.high, -x.low);
+    return noted({x.low > 0 ? x.low : x.high < 0 ? -x.high : 0, high});
+}
+Range select(Perhaps, Range yes, Range no) {
+    return {std::min(yes.low, no.low), std::max(yes.high, no.high)};
+}
+Range gather(const Table& table, Range, int column) {
+    Range all{table.word(0, column), table.word(0, column)};
+    for (int row = 1; row < table.rows(); ++row)
+        all = {std::min<Int128>(all.low, table.word(row, column)),
+               std::max<Int128>(all.high, table.word(row, column))};
+    return noted(all);
+}
+Range blend(Range v0, Range v1, Range weight, int weight_bits) {
+    // The product may pass the word's end on the way: integers wrap and come back, for the sum lies between
+    // v0 and v1.
+    note_operands(v1 - v0, weight);
+    const Range hull{std::min(v0.low, v1.low), std::max(v0.high, v1.high)};
+    return shift_left(hull, weight_bits);
+}
+Range affine(Range, Range k, Range v, std::int64_t low, std::int64_t high) {
+    note_operands(k, v);
+    return noted({low, high});
+}
+Range within(Range x, std::int64_t low, std::int64_t high) {
+    return {std::max<Int128>(x.low, low), std::min<Int128>(x.high, high)};
+}
+Range bit_length(Range x) {
+    return {bit_length(std::max<Int128>(x.low, 0)), bit_length(x.high)};
+}
+Range shift_by(Range x, Range bits) {
+    const auto at = [](Int128 value, Int128 by) {
+        return by >= 0 ? product(value, Int128{1} << std::min<Int128>(by, 120))
+                       : value >> std::min<Int128>(-by, 120);
+    };
+    return noted(
+        spanning({at(x.low, bits.low), at(x.low, bits.high), at(x.high, bits.low), at(x.high, bits.high)}));
+}
+Range square_root(Range x) {
+    return {0, static_cast<Int128>(std::sqrt(static_cast<double>(x.high))) + 1};
+}
+Range quantise(Range x, const Rescale& to) {
+    Range rounded = x;
+    if (to.shift <= 0) {
+        rounded = shift_left(x, -to.shift);
+    } else {
+        noted({x.low - to.bias, x.high + to.bias + to.to_even + to.to_zero});
+        rounded = {round_off(x.low, to), round_off(x.high, to)};
+    }
+    if (rounded.low >= to.lowest && rounded.high <= to.highest) return rounded;
+    if (to.wire >= 0) Range::limited |= std::uint64_t{1} << to.wire;
+    if (to.wraps) return {to.lowest, to.highest};
+    return {limit(rounded.low, to), limit(rounded.high, to)};
+}
+Range quotient(Range numerator, Range denominator, const Rescale& to) {
+    const Range scaled = shift_left(numerator, -to.shift);
+    const Int128 smallest = std::max<Int128>(denominator.low, 1),
+                 largest = std::max<Int128>(denominator.high, 1);
+    noted({0, 2 * largest});
+    // Not noted: whatever the word, a quotient is limited before it is cut to size.
+    const Range q{std::max<Int128>(scaled.low, 0) / largest, std::max<Int128>(scaled.high, 0) / smallest + 1};
+    if (q.high <= to.highest) return q;
+    if (to.wire >= 0) Range::limited |= std::uint64_t{1} << to.wire;
+    return to.wraps ? Range{to.lowest, to.highest} : Range{std::min<Int128>(q.low, to.highest), to.highest};
+}
+
+}  // namespace squint

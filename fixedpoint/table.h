@@ -1,0 +1,71 @@
+// Tables whose entries are raw numbers: built once from real values, read by every word.
+#pragma once
+
+#include "fixedpoint/quantise.h"
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <vector>
+
+namespace squint {
+
+/// Rows of `columns` raw numbers; row i, column c at i * columns + c.  Copies share what was built.
+class Table {
+  public:
+    int wire = -1;       // whose it is, for attribution
+    bool active = true;  // Real reads the quantised words, or (false) the exact values
+
+    Table() = default;
+    Table(int rows, int columns) : columns_(columns), data_(std::make_shared<Data>()) {
+        const auto size = static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns);
+        data_->exact.assign(size, 0), data_->words.assign(size, 0), data_->narrow.assign(size, 0);
+    }
+    int columns() const { return columns_; }
+    int rows() const { return data_ ? static_cast<int>(data_->words.size()) / columns_ : 0; }
+    std::size_t index(std::int64_t row, int column) const {
+        return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
+               static_cast<std::size_t>(column);
+    }
+
+    /// The word, rounded to its Spec.
+    std::int64_t word(std::int64_t row, int column) const { return data_->words[index(row, column)]; }
+    /// Unrounded, in raw units: value * 2^F.
+    double exact(std::int64_t row, int column) const { return data_->exact[index(row, column)]; }
+    /// The same words where all fit 32 bits: what lanes read; null otherwise.
+    const std::int32_t* narrow() const {
+        return data_ && !data_->narrow.empty() ? data_->narrow.data() : nullptr;
+    }
+    const std::vector<std::int64_t>& words() const { return data_->words; }
+    std::size_t bytes() const {
+        return !data_ ? 0 : narrow() ? data_->words.size() * 4 : data_->words.size() * 8;
+    }
+
+    void set(int row, int column, double value, const Spec& spec) {
+        put(index(row, column), value * static_cast<double>(spec.format.one()), quantise_real(value, spec));
+    }
+    void set_raw(int row, int column, std::int64_t raw) {
+        put(index(row, column), static_cast<double>(raw), raw);
+    }
+    /// A word that is not the rounding of its exact value: an encoding's.
+    void set_encoded(int row, int column, double value, std::int64_t raw, const Format& format) {
+        put(index(row, column), value * static_cast<double>(format.one()), raw);
+    }
+
+  private:
+    struct Data {
+        std::vector<double> exact;
+        std::vector<std::int64_t> words;
+        std::vector<std::int32_t> narrow;
+    };
+    void put(std::size_t at, double exact_raw, std::int64_t raw) {
+        data_->exact[at] = exact_raw, data_->words[at] = raw;
+        if (raw < std::numeric_limits<std::int32_t>::min() || raw > std::numeric_limits<std::int32_t>::max())
+            data_->narrow.clear();
+        if (!data_->narrow.empty()) data_->narrow[at] = static_cast<std::int32_t>(raw);
+    }
+    int columns_ = 1;
+    std::shared_ptr<Data> data_;
+};
+
+}  // namespace squint

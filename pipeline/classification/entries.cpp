@@ -1,0 +1,94 @@
+#include "pipeline/classification/entries.h"
+
+#include "core/error.h"
+#include "core/portable_math.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace squint {
+namespace {
+
+// An alpha as the table's word gives it back.  sqrt(alpha) is stored in F bits and expanded, c + (c >> (F -
+// 1)), so that 0 and 1 are exact; the square has 2 F fraction bits (Squeeze, section 4.4.2, as corrected).
+double decoded_alpha(double alpha, const Spec& spec, AlphaEncoding encoding) {
+    if (encoding == AlphaEncoding::alpha) return alpha;
+    const int f = spec.format.fraction_bits;
+    const std::int64_t code = std::min(quantise_real(std::sqrt(alpha), spec), (std::int64_t{1} << f) - 1);
+    const double root =
+        static_cast<double>(code + (code >> (f - 1))) / static_cast<double>(std::int64_t{1} << f);
+    return root * root;
+}
+
+}  // namespace
+
+OpacityUnit build_opacity_unit(const WireSpecs& specs) {
+    const Spec depth = specs[Wire::slab_depth], alpha = specs[Wire::slab_alpha];
+    OpacityUnit unit;
+    unit.depth_fraction = depth.format.fraction_bits;
+    unit.alpha_fraction = alpha.format.fraction_bits;
+    // Lines between rows err by h^2 / 8: h = 2^-b with 2 b + 3 >= F + 1 stays below half a last bit.
+    unit.row_bits = std::min({(alpha.format.fraction_bits - 1) / 2 + 1, 12, depth.format.fraction_bits});
+    // Rows up to the depth that is opaque to the last bit, or the largest depth the wire holds.
+    const double deepest =
+        std::min(std::ldexp(1.0, depth.format.integer_bits), 0.6932 * (alpha.format.fraction_bits + 2));
+    const int rows = static_cast<int>(std::ceil(std::ldexp(deepest, unit.row_bits))) + 2;
+    const int fraction = std::min(alpha.format.fraction_bits + 2, kMostFractionBits);
+    const Spec row_spec{{1, fraction, false}, Rounding::rnd_conv, Overflow::sat};
+    unit.rows = Table(rows, 1);
+    unit.rows.wire = static_cast<int>(Wire::slab_alpha);
+    for (int i = 0; i < rows; ++i)
+        unit.rows.set(i, 0, -portable::expm1(-std::ldexp(i, -unit.row_bits)), row_spec);
+    unit.rows.set_raw(rows - 1, 0, row_spec.format.one());
+    unit.to_alpha =
+        Rescale(fraction + unit.depth_fraction - unit.row_bits, alpha, static_cast<int>(Wire::slab_alpha));
+    return unit;
+}
+
+EntryLookup build_entry_lookup(const ClassificationInputs& in) {
+    const WireSpecs& specs = in.specs;
+    const Spec color = specs[Wire::table_color], alpha = specs[Wire::table_alpha],
+               extinction = specs[Wire::table_extinction];
+    const int n = in.entries.size();
+    EntryLookup lookup;
+    lookup.table = Table(n, EntryLookup::columns);
+    lookup.table.wire = static_cast<int>(Wire::table_color);
+    lookup.input_fraction = in.input_fraction;
+    lookup.last_segment = n - 2;
+    lookup.has_opaque = in.entries.any_opaque();
+    // The square of an F-bit root has 2 F bits; a plain alpha has its own F.
+    const bool rooted = in.settings.encoding == AlphaEncoding::sqrt_alpha;
+    Spec stored = alpha;
+    if (rooted) stored.format = {1, std::min(2 * alpha.format.fraction_bits, kMostFractionBits), false};
+    for (int i = 0; i < n; ++i) {
+        const Entry& entry = in.entries.entry[static_cast<std::size_t>(i)];
+        const double channel[3] = {entry.color.x, entry.color.y, entry.color.z};
+        for (int c = 0; c < 3; ++c) lookup.table.set(i, c, channel[c], color);
+        const double depth = entry.extinction * in.step_world;
+        const double opacity = -portable::expm1(-depth);
+        const double kept = decoded_alpha(opacity, alpha, in.settings.encoding);
+        lookup.table.set_encoded(i, EntryLookup::alpha, opacity, quantise_real(kept, stored), stored.format);
+        lookup.table.set(i, EntryLookup::extinction, depth, extinction);
+        const bool next = i + 1 < n && in.entries.entry[static_cast<std::size_t>(i + 1)].opaque;
+        lookup.table.set_raw(i, EntryLookup::opaque,
+                             entry.opaque ? EntryLookup::entry_is + (next ? EntryLookup::segment_is : 0) : 0);
+    }
+    const Spec slab_alpha = specs[Wire::slab_alpha];
+    // A straight colour leaves on the wire slab_ratio, an opacity on slab_alpha.
+    lookup.to_color = Rescale(color.format.fraction_bits + in.input_fraction, specs[Wire::slab_ratio],
+                              static_cast<int>(Wire::slab_ratio));
+    lookup.to_alpha = Rescale(stored.format.fraction_bits + in.input_fraction, slab_alpha,
+                              static_cast<int>(Wire::slab_alpha));
+    lookup.length_fraction = specs[Wire::length].format.fraction_bits;
+    lookup.to_depth = Rescale(extinction.format.fraction_bits + in.input_fraction + lookup.length_fraction,
+                              specs[Wire::slab_depth], static_cast<int>(Wire::slab_depth));
+    lookup.color_fraction = specs[Wire::slab_ratio].format.fraction_bits;
+    lookup.alpha_fraction = slab_alpha.format.fraction_bits;
+    lookup.one_alpha = std::min(slab_alpha.format.one(), slab_alpha.format.largest());
+    lookup.opacity = build_opacity_unit(specs);
+    return lookup;
+}
+
+}  // namespace squint

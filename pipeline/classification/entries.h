@@ -1,0 +1,182 @@
+// What every classification shares: the entries' own table, linear between entries, and the unit that turns
+// an optical depth into an opacity.
+#ifndef SQUINT_PIPELINE_CLASSIFICATION_ENTRIES_H
+#define SQUINT_PIPELINE_CLASSIFICATION_ENTRIES_H
+
+#include "core/portable_math.h"
+#include "core/transfer_function.h"
+#include "fixedpoint/words.h"
+#include "pipeline/scene.h"
+
+#include <array>
+
+namespace squint {
+
+/// Colour and opacity of a slab; the colour is straight or premultiplied, as the method's kPremultiplied
+/// says.
+template <class W>
+struct Slab {
+    std::array<W, 3> color;
+    W alpha;
+};
+
+/// alpha = 1 - exp(-x): a table over x, linear between rows.  Rows are 2^-row_bits apart; beyond the last,
+/// opaque to the last bit. Error: 2^(-2 row_bits - 3) from the lines, half a last bit from the table's own
+/// words.
+struct OpacityUnit {
+    Table rows;
+    int row_bits = 0;
+    int depth_fraction = 0, alpha_fraction = 0;
+    Rescale to_alpha;
+};
+
+/// A sample in units of table entries: the scalar itself where there is an entry for every level.
+struct InputStage {
+    bool scaled = false;     // entries are not one level apart
+    std::int64_t scale = 0;  // entries per level, raw with scale_fraction
+    double scale_exact = 1;
+    int scale_fraction = 0;
+    bool active = true;
+    Rescale to_input;
+    std::int64_t highest = 0;  // the last entry
+
+    template <class V>
+    void visit(V&& v) {
+        v(to_input);
+    }
+};
+
+/// The sampled transfer function in words.
+struct EntryLookup {
+    enum Column { red, green, blue, alpha, extinction, opaque, columns };
+    enum Opaque { entry_is = 1, segment_is = 2 };  // bits of the column `opaque`
+    Table table;
+    int input_fraction = 0;
+    int last_segment = 0;  // entries - 2
+    bool has_opaque = false;
+    Rescale to_color, to_alpha;  // lerps between entries
+    Rescale to_depth;            // extinction (lerp exact) * length
+    int length_fraction = 0;
+    std::int64_t one_alpha = 0;
+    int color_fraction = 0, alpha_fraction = 0;  // of the straight colour and the opacity that come out
+    OpacityUnit opacity;
+
+    template <class V>
+    void visit(V&& v) {
+        v(table), v(to_color), v(to_alpha), v(to_depth), v(opacity.rows), v(opacity.to_alpha);
+    }
+};
+
+/// What a table builder starts from.
+struct ClassificationInputs {
+    const Entries& entries;
+    const WireSpecs& specs;
+    const ClassificationSettings& settings;
+    double step_world = 1;  // length of a full slab
+    int input_fraction = 0;
+};
+
+/// The entries in words.  Throws InputError for formats that cannot hold them.
+EntryLookup build_entry_lookup(const ClassificationInputs& inputs);
+OpacityUnit build_opacity_unit(const WireSpecs& specs);
+
+}  // namespace squint
+#endif
+
+#include "pipeline/interpolation.h"
+
+#include <hwy/highway.h>
+#if defined(SQUINT_PIPELINE_CLASSIFICATION_ENTRIES_TARGET) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_PIPELINE_CLASSIFICATION_ENTRIES_TARGET
+#undef SQUINT_PIPELINE_CLASSIFICATION_ENTRIES_TARGET
+#else
+#define SQUINT_PIPELINE_CLASSIFICATION_ENTRIES_TARGET
+#endif
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+
+template <class W>
+HWY_INLINE W classification_input(const InputStage& s, W sample) {
+    if (s.scaled) sample = sample * constant<W>(s.scale);
+    return clamp(quantise(sample, s.to_input), constant<W>(0), constant<W>(s.highest));
+}
+template <class T>
+HWY_INLINE Real<T> classification_input(const InputStage& s, Real<T> sample) {
+    if (s.scaled)
+        sample.v *= static_cast<T>(s.active ? static_cast<double>(s.scale)
+                                            : s.scale_exact * power_of_two<double>(s.scale_fraction));
+    return clamp(quantise(sample, s.to_input), constant<Real<T>>(0), constant<Real<T>>(s.highest));
+}
+
+template <class W>
+HWY_INLINE W opacity_of_depth(const OpacityUnit& unit, W depth) {
+    const int fraction = unit.depth_fraction - unit.row_bits;
+    const W row = min(floor_shift(depth, fraction), constant<W>(unit.rows.rows() - 2));
+    const W rest = min(depth - shift_left(row, fraction), constant<W>(std::int64_t{1} << fraction));
+    return quantise(
+        blend(gather(unit.rows, row, 0), gather(unit.rows, row + constant<W>(1), 0), rest, fraction),
+        unit.to_alpha);
+}
+/// Without rounding: the function itself, where its result is not rounded either.
+template <class T>
+HWY_INLINE Real<T> opacity_of_depth(const OpacityUnit& unit, Real<T> depth) {
+    Rescale raw = unit.to_alpha;
+    raw.shift = 0;
+    const double x = static_cast<double>(depth.v) * power_of_two<double>(-unit.depth_fraction);
+    return quantise(Real<T>{static_cast<T>(-portable::expm1(-x) * power_of_two<double>(unit.alpha_fraction))},
+                    raw);
+}
+
+/// Where an input stands between two entries.
+template <class W>
+struct EntryPosition {
+    W entry, fraction;
+};
+template <class W>
+HWY_INLINE EntryPosition<W> entry_position(const EntryLookup& e, W input) {
+    const W entry = min(floor_shift(input, e.input_fraction), constant<W>(e.last_segment));
+    return {entry, min(input - shift_left(entry, e.input_fraction),
+                       constant<W>(std::int64_t{1} << e.input_fraction))};
+}
+
+/// A column at a position, exact: raw with input_fraction bits more.
+template <class W>
+HWY_INLINE W entry_blend(const EntryLookup& e, const EntryPosition<W>& at, int column) {
+    return blend(gather(e.table, at.entry, column), gather(e.table, at.entry + constant<W>(1), column),
+                 at.fraction, e.input_fraction);
+}
+
+/// One where a position is opaque: on an opaque entry, or between two (CONVENTIONS.md).
+template <class W>
+HWY_INLINE auto is_opaque(const EntryLookup& e, const EntryPosition<W>& at) {
+    const W zero = constant<W>(0), one = constant<W>(std::int64_t{1} << e.input_fraction);
+    const W here = gather(e.table, at.entry, EntryLookup::opaque);
+    const W next = gather(e.table, at.entry + constant<W>(1), EntryLookup::opaque);
+    const W entry_bit = here - shift_left(floor_shift(here, 1), 1),
+            next_bit = next - shift_left(floor_shift(next, 1), 1);
+    return (constant<W>(1) < here) | ((at.fraction == zero) & (zero < entry_bit)) |
+           ((at.fraction == one) & (zero < next_bit));
+}
+
+/// The function at one point, for a slab of `length` steps (post-classification; every method where both ends
+/// are equal).
+template <class W>
+HWY_INLINE Slab<W> classify_point(const EntryLookup& e, W input, W length) {
+    const EntryPosition<W> at = entry_position(e, input);
+    const W full = constant<W>(std::int64_t{1} << e.length_fraction);
+    Slab<W> slab;
+    for (int c = 0; c < 3; ++c)
+        slab.color[static_cast<std::size_t>(c)] = quantise(entry_blend(e, at, c), e.to_color);
+    slab.alpha = quantise(entry_blend(e, at, EntryLookup::alpha), e.to_alpha);
+    const auto shorter = length < full;
+    if (any(shorter)) {
+        const W depth = quantise(entry_blend(e, at, EntryLookup::extinction) * length, e.to_depth);
+        slab.alpha = select(shorter, opacity_of_depth(e.opacity, depth), slab.alpha);
+    }
+    if (e.has_opaque) slab.alpha = select(is_opaque(e, at), constant<W>(e.one_alpha), slab.alpha);
+    return slab;
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif

@@ -1,0 +1,21 @@
+#include "pipeline/classification/methods.h"
+
+#include "core/error.h"
+
+#include <fmt/format.h>
+
+namespace squint {
+
+ClassificationMethod build_method(const ClassificationInputs& inputs) {
+    switch (inputs.settings.method) {
+        case Method::pc:
+        case Method::pc_mid:
+            return build_post_classification(inputs);
+        default:
+            break;
+    }
+    throw InputError(
+        fmt::format("classification.method: {} is not built yet", name_of(inputs.settings.method)));
+}
+
+}  // namespace squint

@@ -1,0 +1,26 @@
+// The one list of classification methods.  Adding a method: a file beside this one, a line here, a name in
+// scene.h.
+//
+// A method is a type M with
+//   static constexpr bool kPremultiplied   whether its slab colour already carries the opacity
+//   static constexpr bool kNeedsBack       whether it takes the samples at both ends of the slab
+//   entries                                the entries themselves (EntryLookup), which every method holds
+//   visit(v)                               v(Rescale&) for each rescale, v(Table&, Wire) for each table it
+//   adds describe()                             tables and choices, for `squint plan`
+//   build_...(ClassificationInputs) -> M   its table builder
+// and, for every word, classify(const M&, front, back, length) -> Slab.
+#pragma once
+
+#include "pipeline/classification/pc.h"
+
+#include <variant>
+
+namespace squint {
+
+using ClassificationMethod = std::variant<PostClassification>;
+
+/// The method that the settings name, with its tables built.  Throws InputError for orders and formats it
+/// cannot have.
+ClassificationMethod build_method(const ClassificationInputs& inputs);
+
+}  // namespace squint

@@ -1,0 +1,176 @@
+// Stage 3: gradient.  voxels around a cell (I.0) and weights (1.F) -> raw gradient (sI.F, levels per smallest
+// voxel spacing)
+// -> normal (s1.F).  Squeeze, section 4.3.  Runs only where a light falls on a sample that is not
+// transparent.
+#ifndef SQUINT_PIPELINE_GRADIENT_H
+#define SQUINT_PIPELINE_GRADIENT_H
+
+#include "fixedpoint/words.h"
+#include "pipeline/scene.h"
+
+#include <array>
+
+namespace squint {
+
+struct GradientStage {
+    GradientRule rule = GradientRule::central;
+    int weight_bits = 0;
+    int sample_fraction = 0;                // central_samples: fraction bits of the six samples
+    Rescale to_first, to_second;            // lerp levels
+    Rescale to_gradient;                    // third level, or the difference of samples
+    Rescale to_scaled;                      // after the axis's own spacing
+    std::array<std::int64_t, 3> spacing{};  // raw, in the wire's format; one where spacings are equal
+    int spacing_fraction = 0;
+    bool isotropic = true;
+    std::array<double, 3> spacing_exact{1, 1, 1};
+    bool active = true;
+    Rescale to_normal;  // quotient of a component and the length
+    int normal_fraction = 0;
+
+    template <class V>
+    void visit(V&& v) {
+        v(to_first), v(to_second), v(to_gradient), v(to_scaled), v(to_normal);
+    }
+};
+
+/// Bits that normalising keeps of the largest component, and fraction bits it gives the length.
+inline constexpr int kNormalBits = 15, kNormalGuard = 8;
+
+/// The 4x4x4 voxels about a cell, the cell's corners in the middle; x fastest.  Clamped at the volume's
+/// faces.
+template <class W>
+struct Neighbourhood {
+    std::array<W, 64> voxel;
+    const W& at(int x, int y, int z) const { return voxel[static_cast<std::size_t>((z * 4 + y) * 4 + x)]; }
+};
+
+}  // namespace squint
+#endif
+
+#include "pipeline/interpolation.h"
+#include "pipeline/location.h"
+
+#include <hwy/highway.h>
+#if defined(SQUINT_PIPELINE_GRADIENT_TARGET) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_PIPELINE_GRADIENT_TARGET
+#undef SQUINT_PIPELINE_GRADIENT_TARGET
+#else
+#define SQUINT_PIPELINE_GRADIENT_TARGET
+#endif
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+
+/// Twice the central difference along an axis at one voxel of the neighbourhood: v(+1) - v(-1).
+template <class W>
+HWY_INLINE W central_difference(const Neighbourhood<W>& n, int x, int y, int z, int axis) {
+    const int dx = axis == 0, dy = axis == 1, dz = axis == 2;
+    return n.at(x + dx, y + dy, z + dz) - n.at(x - dx, y - dy, z - dz);
+}
+
+/// 32 times the Sobel gradient along an axis at one voxel: (-1 0 1) along it, (1 2 1) across it twice.
+template <class W>
+HWY_INLINE W sobel_difference(const Neighbourhood<W>& n, int x, int y, int z, int axis) {
+    W sum = constant<W>(0);
+    for (int a = -1; a <= 1; ++a)
+        for (int b = -1; b <= 1; ++b) {
+            const int px = axis == 0 ? x : x + a;
+            const int py = axis == 1 ? y : y + (axis == 0 ? a : b);
+            const int pz = axis == 2 ? z : z + b;
+            const int weight = (a == 0 ? 1 : 0) + (b == 0 ? 1 : 0);  // log2 of 1, 2, 4
+            sum = sum + shift_left(central_difference(n, px, py, pz, axis), weight);
+        }
+    return sum;
+}
+
+/// Differences at the cell's eight voxels, interpolated like a sample.
+template <class W>
+HWY_INLINE W interpolated_difference(const GradientStage& s, const Neighbourhood<W>& n,
+                                     const std::array<W, 3>& weight, int axis) {
+    std::array<W, 8> d;
+    for (int i = 0; i < 8; ++i) {
+        const int x = 1 + (i & 1), y = 1 + (i >> 1 & 1), z = 1 + (i >> 2);
+        d[static_cast<std::size_t>(i)] = s.rule == GradientRule::sobel ? sobel_difference(n, x, y, z, axis)
+                                                                       : central_difference(n, x, y, z, axis);
+    }
+    const int bits = s.weight_bits;
+    const W z0 = lerp(lerp(d[0], d[1], weight[0], bits, s.to_first),
+                      lerp(d[2], d[3], weight[0], bits, s.to_first), weight[1], bits, s.to_second);
+    const W z1 = lerp(lerp(d[4], d[5], weight[0], bits, s.to_first),
+                      lerp(d[6], d[7], weight[0], bits, s.to_first), weight[1], bits, s.to_second);
+    return lerp(z0, z1, weight[2], bits, s.to_gradient);
+}
+
+/// The exact derivative of the trilinear cell along an axis: the four edges' differences, interpolated
+/// across.
+template <class W>
+HWY_INLINE W analytic_difference(const GradientStage& s, const Neighbourhood<W>& n,
+                                 const std::array<W, 3>& weight, int axis) {
+    const auto corner = [&](int along, int a, int b) {
+        const int x = axis == 0 ? along : a, y = axis == 1 ? along : (axis == 0 ? a : b),
+                  z = axis == 2 ? along : b;
+        return n.at(1 + x, 1 + y, 1 + z);
+    };
+    const auto edge = [&](int a, int b) { return corner(1, a, b) - corner(0, a, b); };
+    const std::size_t first = axis == 0 ? 1 : 0, second = axis == 2 ? 1 : 2;
+    const int bits = s.weight_bits;
+    const W b0 = lerp(edge(0, 0), edge(1, 0), weight[first], bits, s.to_first);
+    const W b1 = lerp(edge(0, 1), edge(1, 1), weight[first], bits, s.to_first);
+    return lerp(b0, b1, weight[second], bits, s.to_gradient);
+}
+
+/// Samples one voxel to either side along an axis: their difference, halved (Squeeze, section 4.3).
+template <class W>
+HWY_INLINE W sample_difference(const GradientStage& s, W ahead, W behind) {
+    return quantise(ahead - behind, s.to_gradient);
+}
+
+/// A component in levels per smallest spacing.
+template <class W>
+HWY_INLINE W to_world(const GradientStage& s, W component, int axis) {
+    if (s.isotropic) return component;
+    const auto a = static_cast<std::size_t>(axis);
+    return quantise(
+        component * stage_constant<W>(s.spacing[a], s.spacing_exact[a], s.spacing_fraction, s.active),
+        s.to_scaled);
+}
+
+/// -g / |g| in s1.F, in integers.  Steps: scale so that the largest component has kNormalBits bits (floor of
+/// its magnitude), n = floor(sqrt(sum of squares) 2^kNormalGuard), then three exact quotients.  Error: 2^-14
+/// from the scaling where the gradient has more bits than that, plus half a last bit of the wire.  A zero
+/// gradient gives a zero normal.
+template <class W>
+HWY_INLINE std::array<W, 3> normalise(const GradientStage& s, const std::array<W, 3>& gradient) {
+    const W zero = constant<W>(0);
+    std::array<W, 3> size, normal;
+    for (std::size_t a = 0; a < 3; ++a) size[a] = absolute(gradient[a]);
+    const W largest = max(max(size[0], size[1]), size[2]);
+    const auto nothing = largest == zero;
+    const W shift = constant<W>(kNormalBits) - bit_length(largest);
+    W squares = zero;
+    for (std::size_t a = 0; a < 3; ++a) {
+        size[a] = within(shift_by(size[a], shift), 0, std::int64_t{1} << kNormalBits);
+        squares = squares + size[a] * size[a];
+    }
+    const W length = max(square_root(shift_left(squares, 2 * kNormalGuard)), constant<W>(1));
+    for (std::size_t a = 0; a < 3; ++a) {
+        const W part = quotient(size[a], length, s.to_normal);
+        normal[a] = select(nothing, zero, select(gradient[a] < zero, part, zero - part));
+    }
+    return normal;
+}
+
+/// Without rounding the definition itself will do.
+template <class T>
+HWY_INLINE std::array<Real<T>, 3> normalise(const GradientStage& s, const std::array<Real<T>, 3>& g) {
+    const T length = std::sqrt(g[0].v * g[0].v + g[1].v * g[1].v + g[2].v * g[2].v);
+    if (!(length > 0)) return {};
+    Rescale raw = s.to_normal;
+    raw.shift = 0;
+    const T scale = -power_of_two<T>(s.normal_fraction) / length;
+    return {quantise(Real<T>{g[0].v * scale}, raw), quantise(Real<T>{g[1].v * scale}, raw),
+            quantise(Real<T>{g[2].v * scale}, raw)};
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif

@@ -1,0 +1,137 @@
+#include "pipeline/model.h"
+
+#include "pipeline/raycast.h"
+
+#include <cmath>
+
+namespace squint {
+namespace {
+
+using namespace HWY_NAMESPACE;
+
+// Calls f with the method as its own type: a name becomes a type once, outside the loops.
+template <class F>
+decltype(auto) with_method(const Plan& plan, F&& f) {
+    return std::visit(std::forward<F>(f), plan.method);
+}
+
+template <class W>
+std::array<double, 4> color_of(const Plan& plan, const Pixel<W>& pixel) {
+    const CompositingStage& s = plan.compositing;
+    const double unit = static_cast<double>(s.unit());
+    const double color_unit =
+        s.is_unit255() ? unit : static_cast<double>(plan.specs[Wire::color].format.one());
+    return {to_double(pixel.gathered.color[0]) / color_unit, to_double(pixel.gathered.color[1]) / color_unit,
+            to_double(pixel.gathered.color[2]) / color_unit,
+            1 - to_double(transparency(s, pixel.gathered)) / unit};
+}
+
+void put(Image& image, const char* name, std::size_t at, double value) {
+    if (Channel* channel = image.find(name)) channel->values[at] = static_cast<float>(value);
+}
+template <class W>
+void put_word(Image& image, const char* name, std::size_t at, W word) {
+    if (Channel* channel = image.find(name))
+        channel->words[at] =
+            static_cast<std::uint32_t>(static_cast<std::int64_t>(std::floor(to_double(word) + 0.5)));
+}
+
+template <class W>
+void store(const Plan& plan, const Pixel<W>& pixel, std::size_t at, Image& image) {
+    const std::array<double, 4> color = color_of(plan, pixel);
+    put(image, "R", at, color[0]), put(image, "G", at, color[1]), put(image, "B", at, color[2]),
+        put(image, "A", at, color[3]);
+    const OutputSettings& output = plan.scene.output;
+    if (output.depth) {
+        put(image, "Z", at, pixel.first_hit.value_or(INFINITY));
+        put(image, "Z.mean", at, pixel.weight > 0 ? pixel.weighted_distance / pixel.weight : INFINITY);
+    }
+    if (output.normals) {
+        const double one = std::ldexp(1.0, plan.gradient.normal_fraction);
+        put(image, "N.x", at, to_double(pixel.first_normal[0]) / one);
+        put(image, "N.y", at, to_double(pixel.first_normal[1]) / one);
+        put(image, "N.z", at, to_double(pixel.first_normal[2]) / one);
+    }
+    if (output.samples) put(image, "samples", at, static_cast<double>(pixel.samples));
+    if (output.transparency) put(image, "T", at, 1 - color[3]);
+    if (output.fixed) {
+        put_word(image, "fixed.R", at, pixel.gathered.color[0]),
+            put_word(image, "fixed.G", at, pixel.gathered.color[1]);
+        put_word(image, "fixed.B", at, pixel.gathered.color[2]),
+            put_word(image, "fixed.T", at, transparency(plan.compositing, pixel.gathered));
+    }
+}
+
+template <class W>
+void cast_tile(const Plan& plan, int left, int top, int right, int bottom, Image& image,
+               TileStatistics& statistics) {
+    with_method(plan, [&](const auto& method) {
+        for (int row = top; row < bottom; ++row)
+            for (int column = left; column < right; ++column) {
+                const RaySetup ray = plan.set_up(column, row);
+                const Pixel<W> pixel = cast_ray<W>(plan, method, ray);
+                store(plan, pixel,
+                      static_cast<std::size_t>(row) * static_cast<std::size_t>(image.width) +
+                          static_cast<std::size_t>(column),
+                      image);
+                statistics.rays += ray.slabs > 0;
+                statistics.samples += pixel.samples;
+            }
+    });
+}
+
+}  // namespace
+
+void ModelRenderer::render_tile(int left, int top, int right, int bottom, Image& image,
+                                TileStatistics& statistics) const {
+    if (audit_ && !plan_.real) {
+        Plan audited = plan_;  // its own counters: no thread waits for another
+        statistics.wires = std::make_unique<std::array<WireStatistics, kWires>>();
+        attach_statistics(audited, *statistics.wires);
+        cast_tile<Audited>(audited, left, top, right, bottom, image, statistics);
+    } else if (plan_.real) {
+        cast_tile<Real<double>>(plan_, left, top, right, bottom, image, statistics);
+    } else if (plan_.word_bits == 64) {
+        cast_tile<std::int64_t>(plan_, left, top, right, bottom, image, statistics);
+    } else {
+        cast_tile<Int128>(plan_, left, top, right, bottom, image, statistics);
+    }
+}
+
+std::string ModelRenderer::why() const {
+    if (audit_ && !plan_.real) return "audited integers";
+    if (plan_.real) return "double";
+    return plan_.word_bits == 64 ? "64-bit integers" : "128-bit integers";
+}
+
+namespace {
+// Moves what the wires have collected so far to the slab it belongs to.
+struct Collector {
+    std::vector<TraceEvent>& fresh;
+    RayTrace& trace;
+    std::int64_t current = -1;
+    void slab(std::int64_t k) { flush(), current = k; }
+    void flush() {
+        for (const TraceEvent& e : fresh) trace.events.push_back({current, e});
+        fresh.clear();
+    }
+};
+}  // namespace
+
+RayTrace trace_ray(const Plan& plan, int column, int row) {
+    RayTrace trace;
+    trace.setup = plan.set_up(column, row);
+    Plan traced = plan;
+    std::array<WireStatistics, kWires> statistics;
+    std::vector<TraceEvent> fresh;
+    for (WireStatistics& s : statistics) s.trace = &fresh;
+    attach_statistics(traced, statistics);
+    Collector collector{fresh, trace};
+    with_method(traced, [&](const auto& method) {
+        trace.color = color_of(traced, cast_ray<Audited>(traced, method, trace.setup, collector));
+    });
+    collector.flush();
+    return trace;
+}
+
+}  // namespace squint

@@ -1,0 +1,95 @@
+// The plan: what a scene exercises, decided before the first ray.  Formats become shifts and limits, the
+// transfer function becomes tables, names become types, and each stage gets the narrowest word its exact
+// results fit.
+#pragma once
+
+#include "core/camera.h"
+#include "core/transfer_function.h"
+#include "core/volume.h"
+#include "pipeline/classification/methods.h"
+#include "pipeline/compositing.h"
+#include "pipeline/gradient.h"
+#include "pipeline/interpolation.h"
+#include "pipeline/location.h"
+#include "pipeline/presets.h"
+#include "pipeline/scene.h"
+#include "pipeline/shading.h"
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace squint {
+
+/// Names of the six stages, in order; a wire's WireInfo::stage is one of them.
+inline constexpr std::array<std::string_view, 6> kStages{"sample location", "interpolation", "gradient",
+                                                         "classification",  "shading",       "compositing"};
+
+/// What became of a stage.
+struct StageReport {
+    std::string name;
+    bool modelled = true;
+    std::string why;  // left out, and why; or how it runs
+    WordNeeds needs;  // sign included
+};
+
+struct TableReport {
+    std::string name;
+    std::int64_t rows = 0, columns = 0, bytes = 0;
+    std::string note;
+};
+
+struct Plan {
+    Scene scene;
+    std::shared_ptr<const Volume> volume;
+    Camera camera;
+    Entries entries;
+    WireSpecs specs;
+    bool real = false;      // preset `real`: doubles, nothing quantised
+    double step_world = 1;  // length of a full slab
+
+    LocationStage location;
+    InterpolationStage interpolation;
+    GradientStage gradient;
+    InputStage input;
+    ClassificationMethod method;
+    ShadingStage shading;
+    CompositingStage compositing;
+    bool lit = false;
+    bool projection_mode = false;  // mip, minip, average
+    bool needs_back = false;       // slab methods take the samples at both ends
+    bool wants_depth = false;
+    Rescale to_average;             // average mode: sum of inputs over their number
+    bool skips_empty_space = true;  // a transparent sample is the identity
+
+    int word_bits = 64;  // of the golden model: 64 or 128
+    std::vector<StageReport> stages;
+    std::vector<TableReport> tables;
+    std::vector<std::string> notes;     // what a user should know
+    std::vector<std::string> warnings;  // what a user should mend
+
+    RaySetup set_up(int column, int row) const;
+    Spec spec(Wire wire) const { return specs[wire]; }
+};
+
+/// Resolves a scene against its volume.  Throws InputError, naming the wire and the bits it needs, for what
+/// no word holds.
+Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int frame = 0);
+
+/// The same plan with only these wires rounded, the rest in double (attribution of errors to stages); `real`
+/// rounds none.
+void set_active(Plan& plan, const std::array<bool, kWires>& rounded);
+
+/// For audits: every Rescale of wire w counts into statistics[w].
+void attach_statistics(Plan& plan, std::array<WireStatistics, kWires>& statistics);
+
+/// Calls v(Rescale&) for every Rescale and v(Table&) for every table of a plan.
+template <class V>
+void visit_stages(Plan& plan, V&& v) {
+    plan.location.visit(v), plan.interpolation.visit(v), plan.gradient.visit(v), plan.input.visit(v);
+    std::visit([&](auto& method) { method.visit(v); }, plan.method);
+    plan.shading.visit(v), plan.compositing.visit(v);
+}
+
+}  // namespace squint

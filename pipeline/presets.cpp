@@ -1,0 +1,125 @@
+#include "pipeline/presets.h"
+
+#include <algorithm>
+
+namespace squint {
+namespace {
+
+constexpr Spec u(int i, int f, Rounding rounding) {
+    return {{i, f, false}, rounding, Overflow::sat};
+}
+constexpr Spec s(int i, int f, Rounding rounding) {
+    return {{i, f, true}, rounding, Overflow::sat};
+}
+int clip(int bits) {
+    return std::clamp(bits, 0, kMostFractionBits);
+}
+
+// Squeeze, section 5, to the letter: what it does not name follows from its neighbours.
+WireSpecs squeeze(const PresetInputs& in) {
+    constexpr Rounding r = Rounding::trn;
+    WireSpecs w{};
+    w[Wire::location] = u(11, 12, r), w[Wire::direction] = s(1, 12, r), w[Wire::weight] = u(1, 12, r);
+    w[Wire::length] = u(1, 15, r);
+    w[Wire::lerp_x] = w[Wire::lerp_y] = w[Wire::sample] = u(12, 12, r);
+    w[Wire::gradient_lerp] = w[Wire::gradient] = s(12, 12, r), w[Wire::spacing] = u(1, 12, r),
+    w[Wire::normal] = s(1, 12, r);
+    w[Wire::classification_input] = u(12, 0, r);
+    w[Wire::table_color] = u(1, 15, r), w[Wire::table_alpha] = u(1, 15, r);
+    w[Wire::table_extinction] = u(std::max(9, in.total_depth_bits), 15, r);
+    w[Wire::table_moment] = w[Wire::table_extinction];
+    w[Wire::slab_depth] = u(4, 15, r), w[Wire::slab_ratio] = u(1, 15, r), w[Wire::slab_alpha] = u(1, 15, r);
+    w[Wire::slab_color] = u(1, 15, r);
+    w[Wire::light] = s(1, 15, r), w[Wire::dot] = s(1, 15, r), w[Wire::power] = u(1, 16, r),
+    w[Wire::material] = u(1, 15, r);
+    w[Wire::intensity] = u(1, 15, r), w[Wire::lit_color] = u(1, 15, r);
+    w[Wire::contribution] = w[Wire::color] = w[Wire::transparency] = u(1, 15, r);
+    return w;
+}
+
+// Squeeze's restricted texture-map pipeline: 8-bit words throughout.
+WireSpecs eight_bit(const PresetInputs& in) {
+    constexpr Rounding r = Rounding::trn;
+    WireSpecs w = squeeze(in);
+    w[Wire::weight] = u(1, 8, r),
+    w[Wire::lerp_x] = w[Wire::lerp_y] = w[Wire::sample] = u(in.scalar_bits, 0, r);
+    w[Wire::classification_input] = u(in.entry_bits, 0, r);
+    w[Wire::gradient_lerp] = w[Wire::gradient] = s(in.scalar_bits, 1, r), w[Wire::normal] = s(1, 7, r);
+    w[Wire::table_color] = w[Wire::table_alpha] = u(0, 8, r);
+    for (const Wire wire :
+         {Wire::slab_ratio, Wire::slab_alpha, Wire::slab_color, Wire::contribution, Wire::color,
+          Wire::transparency, Wire::lit_color, Wire::intensity, Wire::material, Wire::power})
+        w[wire] = u(1, 8, r);
+    w[Wire::light] = w[Wire::dot] = s(1, 8, r), w[Wire::slab_depth] = u(4, 8, r);
+    return w;
+}
+
+// Squeeze's widths where its corrected analysis holds, rounded to even, and the direction as a wire of its
+// own.  Lerp levels and gradients are cut so that every exact product fits a 32-bit word: 12 bits of weight
+// leave the middle levels 19 - I bits.
+WireSpecs standard(const PresetInputs& in) {
+    constexpr Rounding r = Rounding::rnd_conv;
+    const int scalar = in.scalar_bits, weight = scalar <= 12 ? 12 : 10;
+    const int level = 31 - scalar - weight;  // fraction bits of a middle level: I + level + weight <= 31
+    const int gradient = 18 - scalar;
+    WireSpecs w{};
+    w[Wire::location] = u(in.location_bits, clip(31 - in.location_bits), r);
+    w[Wire::direction] = s(in.direction_bits, w[Wire::location].format.fraction_bits, r);
+    w[Wire::weight] = u(1, weight, r), w[Wire::length] = u(1, 15, r);
+    w[Wire::lerp_x] = w[Wire::lerp_y] = u(scalar, level, r),
+    w[Wire::sample] = u(scalar, std::min(12, 24 - scalar), r);
+    w[Wire::gradient_lerp] = w[Wire::gradient] = s(scalar, gradient, r), w[Wire::spacing] = u(1, 12, r);
+    w[Wire::normal] = s(1, 15, r);
+    w[Wire::classification_input] = u(in.entry_bits, 10, r);
+    w[Wire::table_color] = w[Wire::table_alpha] = u(1, 15, r);
+    w[Wire::table_extinction] = w[Wire::table_moment] =
+        u(in.total_depth_bits, std::min(20, clip(31 - in.total_depth_bits)), r);
+    w[Wire::slab_depth] = u(4, 18, r);
+    w[Wire::slab_ratio] = w[Wire::slab_alpha] = w[Wire::slab_color] = u(1, 15, r);
+    w[Wire::light] = s(1, 14, r), w[Wire::dot] = s(1, 15, r), w[Wire::power] = u(1, 15, r),
+    w[Wire::material] = u(1, 14, r);
+    w[Wire::intensity] = u(1, 14, r), w[Wire::lit_color] = u(1, 15, r);
+    w[Wire::contribution] = w[Wire::color] = w[Wire::transparency] = u(1, 15, r);
+    return w;
+}
+
+// Wide enough that rounding vanishes: fraction bits of tables and compositing at least 9 + log2(samples per
+// ray).
+WireSpecs wide(const PresetInputs& in) {
+    constexpr Rounding r = Rounding::rnd_conv;
+    const int f = std::clamp(9 + in.ray_bits + 2, 20, kMostFractionBits);
+    WireSpecs w = standard(in);
+    w[Wire::location] = u(in.location_bits, 24, r), w[Wire::direction] = s(in.direction_bits, 24, r),
+    w[Wire::weight] = u(1, 20, r);
+    w[Wire::length] = u(1, 22, r);
+    w[Wire::lerp_x] = w[Wire::lerp_y] = w[Wire::sample] = u(in.scalar_bits, 20, r);
+    w[Wire::gradient_lerp] = w[Wire::gradient] = s(in.scalar_bits, 16, r), w[Wire::spacing] = u(1, 20, r),
+    w[Wire::normal] = s(1, 20, r);
+    w[Wire::classification_input] = u(in.entry_bits, 20, r);
+    w[Wire::table_extinction] = w[Wire::table_moment] = u(in.total_depth_bits, 24, r),
+    w[Wire::slab_depth] = u(5, 24, r);
+    for (const Wire wire :
+         {Wire::table_color, Wire::table_alpha, Wire::slab_ratio, Wire::slab_alpha, Wire::slab_color,
+          Wire::lit_color, Wire::contribution, Wire::color, Wire::transparency})
+        w[wire] = u(1, f, r);
+    w[Wire::light] = w[Wire::dot] = s(1, 20, r);
+    w[Wire::power] = w[Wire::material] = w[Wire::intensity] = u(1, 20, r);
+    return w;
+}
+
+}  // namespace
+
+const std::vector<std::string>& preset_names() {
+    static const std::vector<std::string> names{"default", "squeeze", "eight_bit", "wide", "real"};
+    return names;
+}
+
+bool preset_specs(std::string_view name, const PresetInputs& inputs, WireSpecs& specs) {
+    if (name == "default") return specs = standard(inputs), true;
+    if (name == "squeeze") return specs = squeeze(inputs), true;
+    if (name == "eight_bit") return specs = eight_bit(inputs), true;
+    if (name == "wide" || name == "real") return specs = wide(inputs), true;
+    return false;
+}
+
+}  // namespace squint

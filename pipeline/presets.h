@@ -1,0 +1,30 @@
+// Precision presets: a Spec for every wire (CONVENTIONS.md, "Presets"; the table is in docs/pipeline.md).
+#pragma once
+
+#include "pipeline/wires.h"
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace squint {
+
+/// What a preset's formats follow: "the word and table sizes follow the data's range, the ray length and the
+/// sampling rate".
+struct PresetInputs {
+    int scalar_bits = 12;       // I of a scalar
+    int location_bits = 11;     // I of a location: the longest axis
+    int entry_bits = 12;        // I of a classification input: the table's size
+    int direction_bits = 1;     // I of |V|
+    int ray_bits = 10;          // log2 of the samples on the longest ray, rounded up
+    int depth_bits = 4;         // I of the optical depth of one slab
+    int total_depth_bits = 12;  // I of the prefix sum of all entries' optical depths
+};
+
+const std::vector<std::string>& preset_names();
+
+/// Fills `specs`; false if the name is unknown.  `real` has the formats of `wide`, which say where its raw
+/// units stand.
+bool preset_specs(std::string_view name, const PresetInputs& inputs, WireSpecs& specs);
+
+}  // namespace squint

@@ -1,0 +1,86 @@
+#include "pipeline/render.h"
+
+#include "pipeline/model.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+namespace squint {
+namespace {
+
+struct Tile {
+    int left, top, right, bottom;
+};
+
+std::vector<Tile> tiles_of(int width, int height, int size) {
+    std::vector<Tile> tiles;
+    for (int top = 0; top < height; top += size)
+        for (int left = 0; left < width; left += size)
+            tiles.push_back({left, top, std::min(left + size, width), std::min(top + size, height)});
+    return tiles;
+}
+
+void add_channels(const Scene& scene, Image& image) {
+    for (const char* name : {"R", "G", "B", "A"}) image.add_float(name);
+    if (scene.output.depth) image.add_float("Z"), image.add_float("Z.mean");
+    if (scene.output.normals) image.add_float("N.x"), image.add_float("N.y"), image.add_float("N.z");
+    if (scene.output.samples) image.add_float("samples");
+    if (scene.output.transparency) image.add_float("T");
+    if (scene.output.fixed)
+        for (const char* name : {"fixed.R", "fixed.G", "fixed.B", "fixed.T"}) image.add_words(name);
+}
+
+}  // namespace
+
+Rendering render(const Plan& plan, const RenderOptions& options) {
+    Rendering result;
+    Image& image = result.image;
+    image.width = plan.camera.width, image.height = plan.camera.height;
+    add_channels(plan.scene, image);
+
+    RenderStatistics& statistics = result.statistics;
+    statistics.threads = options.threads > 0
+                             ? options.threads
+                             : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    statistics.path = "model";
+    const std::vector<Tile> tiles = tiles_of(image.width, image.height, std::max(1, options.tile));
+    std::vector<TileStatistics> per_tile(tiles.size());
+    std::atomic<std::size_t> done{0};
+    std::atomic<bool> stopped{false};
+    const ModelRenderer model(plan, options.audit);
+    statistics.why = model.why();
+
+    const auto start = std::chrono::steady_clock::now();
+    tbb::task_arena arena(statistics.threads);
+    arena.execute([&] {
+        tbb::parallel_for(
+            tbb::blocked_range<std::size_t>(0, tiles.size(), 1),
+            [&](const tbb::blocked_range<std::size_t>& range) {
+                for (std::size_t i = range.begin(); i != range.end(); ++i) {
+                    if (options.cancelled && *options.cancelled) stopped = true;
+                    if (stopped) return;
+                    const Tile& t = tiles[i];
+                    model.render_tile(t.left, t.top, t.right, t.bottom, image, per_tile[i]);
+                    const std::size_t now = ++done;
+                    if (options.progress)
+                        options.progress(static_cast<double>(now) / static_cast<double>(tiles.size()));
+                }
+            },
+            tbb::simple_partitioner());
+    });
+    if (stopped) throw Cancelled{};
+    statistics.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    for (const TileStatistics& t : per_tile) {
+        statistics.rays += t.rays, statistics.samples += t.samples;
+        if (t.wires)
+            for (std::size_t w = 0; w < t.wires->size(); ++w) statistics.wires[w].merge((*t.wires)[w]);
+    }
+    return result;
+}
+
+}  // namespace squint

@@ -1,0 +1,52 @@
+// Rendering a plan: the one entrance to every path through the pipeline.
+#pragma once
+
+#include "core/image.h"
+#include "pipeline/plan.h"
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <string>
+
+namespace squint {
+
+enum class Path { automatic, model, lanes };
+
+struct RenderOptions {
+    int threads = 0;  // 0: one a processor
+    int tile = 32;    // pixels a side
+    Path path = Path::automatic;
+    std::string target;  // SIMD target by name ("AVX3", "AVX2", "SSE4", "EMU128"); empty: the best there is
+    LayoutRule layout = LayoutRule::automatic;
+    bool skip = true;                      // leave out empty space
+    bool audit = false;                    // count what every wire carried; runs the audited model
+    bool as_float = false;                 // lanes of float32: the honest comparison, never the same bits
+    std::function<void(double)> progress;  // called with the part done, from any thread
+    const std::atomic<bool>* cancelled = nullptr;
+};
+
+struct RenderStatistics {
+    std::string path, target, why, layout;  // what ran, and why
+    int threads = 1;
+    std::int64_t rays = 0, samples = 0;  // rays that met the volume; slabs composited
+    double seconds = 0;                  // ray casting alone
+    double setup_seconds = 0;  // layouts and block structures, where they were built for this picture
+    std::int64_t bytes = 0;    // volume layouts, tables and buffers
+    std::array<WireStatistics, kWires> wires;  // with audit
+};
+
+/// Thrown when `cancelled` became true.
+struct Cancelled {};
+
+struct Rendering {
+    Image image;
+    RenderStatistics statistics;
+};
+
+/// R G B A and the channels the scene asks for.  The same bits for every thread count, tile size, path,
+/// target and layout.
+Rendering render(const Plan& plan, const RenderOptions& options = {});
+
+}  // namespace squint
