@@ -116,7 +116,7 @@ class Reader {
                    allowed_text<std::remove_reference_t<decltype(setting)>>(key));
         const bool known = std::find(words.begin(), words.end(), value.text) != words.end();
         const bool file = key == "precision.preset" && value.text.find_first_of("./$") != std::string::npos;
-        if (!words.empty() && !known && !file && !(value.text.empty() && key == "volume.type"))
+        if (!words.empty() && !known && !file && !(value.text.empty() && may_be_empty(key)))
             refuse_word(value, key, words, allowed_text<std::remove_reference_t<decltype(setting)>>(key));
         setting = value.text;
         if (file_.empty()) forget_rivals(key, setting);
@@ -334,6 +334,9 @@ void check_transfer_function(const Scene& scene) {
     if (tf.color.empty() != tf.opacity.empty())
         refuse(scene, tf.color.empty() ? "transfer_function.opacity" : "transfer_function.color",
                tf.color.empty() ? "no color" : "no opacity", "color and opacity together");
+    if (!tf.file.empty() && !tf.file.ends_with(".json") && !tf.file.ends_with(".vp"))
+        refuse(scene, "transfer_function.file", in_quotes(tf.file),
+               "a ParaView colour map (.json) or a Slicer volume property (.vp)");
     const bool brings_unit = !tf.preset.empty() || tf.file.ends_with(".vp");
     if (tf.unit_distance == 0 && !brings_unit)
         refuse(scene, "transfer_function.unit_distance",

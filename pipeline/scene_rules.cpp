@@ -1,5 +1,7 @@
 #include "pipeline/scene_rules.h"
 
+#include "core/procedural.h"
+
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -59,10 +61,23 @@ const Limits& limits_of(std::string_view key) {
 
 std::vector<std::string_view> words_of(std::string_view key) {
     if (key == "volume.type") return {"u8", "i16", "u16", "f32"};
+    if (key == "volume.procedural") {
+        std::vector<std::string_view> names;
+        for (const ProceduralField& field : procedural_fields()) names.push_back(field.name);
+        return names;
+    }
+    if (key == "transfer_function.preset") {
+        static const std::vector<std::string> presets = transfer_function_presets();
+        return {presets.begin(), presets.end()};
+    }
     if (key == "volume.endian") return {"little", "big"};
     if (key == "transfer_function.color_space") return {"linear", "srgb"};
     if (key == "precision.preset") return {std::begin(kPrecisionPresets), std::end(kPrecisionPresets)};
     return {};
+}
+
+bool may_be_empty(std::string_view key) {
+    return key == "volume.type" || key == "volume.procedural" || key == "transfer_function.preset";
 }
 
 std::vector<std::size_t> counts_of(std::string_view key) {

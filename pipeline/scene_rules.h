@@ -32,6 +32,8 @@ struct Limits {
 const Limits& limits_of(std::string_view key);
 /// The words a text setting may hold; empty where any text will do.
 std::vector<std::string_view> words_of(std::string_view key);
+/// Whether "" stands for "not given" where words are listed.
+bool may_be_empty(std::string_view key);
 /// How many numbers a list setting holds: {1, 3} is one or three; empty where any number will do.
 std::vector<std::size_t> counts_of(std::string_view key);
 

@@ -129,6 +129,10 @@ TEST(SceneFile, ListsTheNamesOfAnEnumeration) {
               "s.toml:5:10: classification.method: found \"pisp\"; did you mean \"pips\"?; allowed: pc, "
               "pc_mid, pi2d, "
               "pi2d_no_attenuation, pi1d, pi1d_engel, pips or leg");
+    EXPECT_THAT(refusal("[volume]\nprocedural = 'fantom'\n"),
+                HasSubstr("did you mean \"phantom\"?; allowed: "));
+    EXPECT_THAT(refusal_of_file("[transfer_function]\npreset = 'ct_bnoe'\n"),
+                HasSubstr("did you mean \"ct_bone\"?; allowed: "));
     EXPECT_EQ(refusal("[precision]\npreset = 'fast'\n"),
               "s.toml:5:10: precision.preset: found \"fast\"; allowed: default, squeeze, eight_bit, wide or "
               "real, or the path of "
@@ -212,6 +216,8 @@ TEST(SceneFile, WantsExactlyOneTransferFunction) {
     EXPECT_THAT(refusal_of_file("[transfer_function]\nunit_distance = 0\npoints = [[0, 1, 1, 1, 1]]\n"),
                 StartsWith("s.toml:2:17: transfer_function.unit_distance: found 0; "));
     EXPECT_EQ(refusal_of_file("[transfer_function]\nfile = 'a.vp'\n"), "accepted");
+    EXPECT_THAT(refusal_of_file("[transfer_function]\nfile = 'a.xml'\n"),
+                StartsWith("s.toml:2:8: transfer_function.file: found \"a.xml\"; allowed: a ParaView"));
     EXPECT_THAT(refusal_of_file("[transfer_function]\nfile = 'a.json'\n"),
                 HasSubstr("unit_distance: found none"));
 }
