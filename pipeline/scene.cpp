@@ -102,9 +102,7 @@ VolumeSource volume_source(const Scene& scene) {
 Scene built_in_scene() {
     Scene scene;
     scene.name = "built-in scene";
-    scene.volume.procedural = "phantom";
-    scene.volume.dims = {128, 128, 128};
-    scene.volume.bits = 12;
+    scene.volume.procedural = "phantom";  // 128^3 of 12 bits unless said otherwise
     // The phantom's matter, in levels of 0 to 4095: skin 655, tissue 1310, bone 2252, brain 2948, vessels
     // 3849.
     scene.transfer_function.points = {

@@ -74,6 +74,8 @@ class Reader {
         std::size_t end = key.find('.');
         while (end != std::string::npos && is_section(key.substr(0, end))) end = key.find('.', end + 1);
         const std::string wrong = key.substr(0, end);
+        if (std::find(keys_.begin(), keys_.end(), wrong) != keys_.end() || wrong == "lights")
+            refuse(entry, key, "a name below " + wrong, wrong + " itself");
         const std::size_t point = wrong.rfind('.');
         const std::string section = point == std::string::npos ? "" : wrong.substr(0, point);
         const std::string name = wrong.substr(point + 1);  // npos + 1 is 0
@@ -94,7 +96,6 @@ class Reader {
                                   const std::string& section, const std::vector<std::string_view>& candidates,
                                   std::string_view elsewhere = {}) const {
         std::string_view near = nearest_name(name, candidates);
-        if (near == name) near = {};  // a setting that was used as a section
         if (near.empty()) near = elsewhere;
         throw InputError(fmt::format(
             "{}: unknown setting {}; {}",

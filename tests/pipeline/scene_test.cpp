@@ -105,6 +105,10 @@ TEST(SceneFile, NamesTheNearestSettingForAnUnknownOne) {
               "s.toml:5:1: unknown setting \"colour\"; did you mean \"color\"?");
     EXPECT_EQ(refusal("[image]\nzzzzzz = 1\n"),
               "s.toml:5:1: unknown setting \"zzzzzz\"; allowed in image: background, height or width");
+    EXPECT_EQ(refusal("", {"sampling.step.x=1"}),
+              "--set sampling.step.x: found a name below sampling.step; allowed: sampling.step itself");
+    EXPECT_THAT(refusal("", {"sampeling.step=1"}),
+                EndsWith("unknown setting \"sampeling\"; did you mean \"sampling\"?"));
     EXPECT_EQ(refusal("", {"sampling.stepp=1"}),
               "--set sampling.stepp: unknown setting \"stepp\"; did you mean \"step\"?");
 }
