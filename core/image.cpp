@@ -4,6 +4,7 @@
 #include "core/error.h"
 #include "core/srgb.h"
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
 
@@ -54,16 +55,18 @@ std::string format_of(const std::string& path) {
     return "";
 }
 
-/// Writes packed pixels of `spec` to a file of a named format, whole or not at all.
+/// Writes packed pixels of `spec` to a file of a named format, whole or not at all.  Encoded in memory first:
+/// OpenImageIO's PNG writer does not notice a full disk.
 void write(const std::string& path, const char* format, const OIIO::ImageSpec& spec, OIIO::TypeDesc type,
            const void* data) {
-    write_whole(path, [&](const std::string& temporary) {
-        const auto output = OIIO::ImageOutput::create(format);
-        if (!output)
-            throw InputError(fmt::format("{}: cannot write, OpenImageIO has no writer for {}", path, format));
-        if (!output->open(temporary, spec) || !output->write_image(type, data) || !output->close())
-            throw InputError(fmt::format("{}: cannot write: {}", path, one_line(output->geterror())));
-    });
+    OIIO::Filesystem::IOVecOutput encoded;
+    const auto output = OIIO::ImageOutput::create(format);
+    if (!output || !output->set_ioproxy(&encoded))
+        throw InputError(fmt::format("{}: cannot write, OpenImageIO has no writer for {}", path, format));
+    if (!output->open(path, spec) || !output->write_image(type, data) || !output->close())
+        throw InputError(fmt::format("{}: cannot write: {}", path, one_line(output->geterror())));
+    const auto& bytes = encoded.buffer();
+    write_text_whole(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 /// Every channel holds one value a pixel, and there is a pixel: promises of the caller, checked where a file

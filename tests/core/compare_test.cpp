@@ -98,7 +98,7 @@ TEST(Compare, AMillionSmallDifferencesKeepTheirBias) {
     const Image a = flat(1000, 1000, 0.25f);
     Image b = a;
     for (float& v : b.find("R")->values) v = 0.25f + 0x1p-24f;
-    const Difference& red = compare(a, b, false, false).channel("R", false);
+    const Difference red = compare(a, b, false, false).channel("R", false);
     EXPECT_EQ(red.bias, -0x1p-24);  // sums of one power of two are exact
     EXPECT_EQ(red.rmse, 0x1p-24);
 }

@@ -5,9 +5,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <cmath>
+#include <csignal>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -110,6 +113,24 @@ TEST(Exr, AFolderThatCannotBeWrittenIsNamedAndNothingRemains) {
     torn.channels[2].values.pop_back();
     EXPECT_THAT(message([&] { write_exr(torn, folder / "a.exr", {}); }),
                 HasSubstr("channel B has not 37 x 23 values"));
+    EXPECT_EQ(folder.files(), 0u);
+}
+
+TEST(Exr, AFullDiskIsReportedAndNothingRemainsForPicturesAndPreviews) {
+    const Folder folder;
+    const double black[3] = {0, 0, 0};
+    // Files of this process may not grow beyond 4 kB for a moment: less than either picture needs.
+    rlimit before{};
+    ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+    const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit small{4096, before.rlim_max};
+    ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+    const std::string exr = message([&] { write_exr(picture(200, 200), folder / "a.exr", {}); });
+    const std::string png = message([&] { write_preview_png(picture(200, 200), folder / "a.png", black); });
+    setrlimit(RLIMIT_FSIZE, &before);
+    std::signal(SIGXFSZ, handler);
+    EXPECT_THAT(exr, HasSubstr("a.exr: cannot write"));
+    EXPECT_THAT(png, HasSubstr("a.png: cannot write"));
     EXPECT_EQ(folder.files(), 0u);
 }
 
