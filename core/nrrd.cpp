@@ -31,6 +31,13 @@ constexpr const char* kScaleKey = "squint value scale";
 constexpr const char* kOffsetKey = "squint value offset";
 constexpr const char* kBitsKey = "squint scalar bits";
 
+/// Bytes of a file as they may stand in a message: one line.
+std::string printable(std::string text) {
+    for (char& c : text)
+        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
+    return text;
+}
+
 // --- The header's text
 // -----------------------------------------------------------------------------------------------------
 
@@ -84,17 +91,25 @@ HeaderText split_header(const std::string& path, const MappedFile& file) {
     return header;
 }
 
+void check_version(const std::string& path, const HeaderText& header) {
+    const std::string version = header.text.substr(0, header.text.find('\n'));
+    for (const char* known : {"NRRD00.01", "NRRD0001", "NRRD0002", "NRRD0003", "NRRD0004", "NRRD0005"})
+        if (version == known) return;
+    throw InputError(fmt::format("{}: NRRD header: version is \"{}\", but NRRD0001 to NRRD0005 are allowed",
+                                 path, printable(version.substr(0, 16))));
+}
+
 /// The data file beside the header.  A header from elsewhere must not make us read any file it likes.
 std::string data_path(const std::string& path, const std::string& name) {
     const std::filesystem::path data(name);
     if (name == "LIST" || name.starts_with("LIST ") || name.find('%') != std::string::npos)
         throw InputError(fmt::format(
             "{}: data file is \"{}\", but data in several files are not supported: one name is allowed", path,
-            name));
+            printable(name)));
     if (data.is_absolute() || std::find(data.begin(), data.end(), "..") != data.end())
         throw InputError(fmt::format(
             "{}: data file is \"{}\", but only files in the header's own folder or below are allowed", path,
-            name));
+            printable(name)));
     return (std::filesystem::path(path).parent_path() / data).string();
 }
 
@@ -136,9 +151,7 @@ std::string one_line(std::string text) {
     std::string message = lines.back();
     for (const std::string& line : lines)
         if (line.starts_with("trouble parsing")) message = line.substr(8) + ": " + message;
-    for (char& c : message)
-        if (static_cast<unsigned char>(c) < 0x20) c = ' ';
-    return message;
+    return printable(message);
 }
 
 void parse(const std::string& path, const HeaderText& header, Parsed& parsed) {
@@ -418,6 +431,7 @@ StoredVolume read_nrrd(const std::string& path, const MappedFile& file, const Lo
     if (!is_nrrd(file))
         throw InputError(fmt::format("{}: no NRRD: the file does not begin with \"NRRD\"", path));
     const HeaderText header = split_header(path, file);
+    check_version(path, header);
     const std::string data_file =
         header.data_file.empty() ? std::string() : data_path(path, header.data_file);
     const std::lock_guard lock(teem_lock());

@@ -20,7 +20,7 @@ struct Volume {
     Vec3 spacing{1, 1, 1};          // world units between voxel centres
     Vec3 origin{0, 0, 0};           // world position of the first voxel's centre
     ScalarType type = ScalarType::u8;
-    std::shared_ptr<const void> data;  // dims.x * dims.y * dims.z scalars of `type`, little-endian
+    std::shared_ptr<const void> data;  // dims.x * dims.y * dims.z scalars of `type`, little-endian; 64 more bytes can be read
     std::uint32_t smallest = 0;     // least and greatest scalar in the data
     std::uint32_t largest = 0;
     int scalar_bits = 8;            // I: integer bits that hold every scalar of the declared range

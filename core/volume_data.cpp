@@ -37,16 +37,28 @@ struct Piece {
     std::string hash;
 };
 
+/// 64 running minima and maxima side by side: a shape that compilers turn into vector code.
 template <class Scalar>
 Piece measure_piece(const Scalar* scalars, std::size_t count) {
-    Scalar smallest = scalars[0], largest = scalars[0];
-    for (std::size_t i = 0; i < count; ++i) {
-        smallest = std::min(smallest, scalars[i]);
-        largest = std::max(largest, scalars[i]);
+    constexpr std::size_t kLanes = 64;
+    Scalar least[kLanes], greatest[kLanes];
+    std::fill_n(least, kLanes, scalars[0]);
+    std::fill_n(greatest, kLanes, scalars[0]);
+    std::size_t i = 0;
+    for (; i + kLanes <= count; i += kLanes)
+        for (std::size_t lane = 0; lane < kLanes; ++lane) {
+            const Scalar scalar = scalars[i + lane];
+            least[lane] = scalar < least[lane] ? scalar : least[lane];
+            greatest[lane] = scalar > greatest[lane] ? scalar : greatest[lane];
+        }
+    for (; i < count; ++i) {
+        least[0] = std::min(least[0], scalars[i]);
+        greatest[0] = std::max(greatest[0], scalars[i]);
     }
     Hasher hasher;
     hasher.bytes(scalars, count * sizeof(Scalar));
-    return {smallest, largest, hasher.hex()};
+    return {*std::min_element(least, least + kLanes), *std::max_element(greatest, greatest + kLanes),
+            hasher.hex()};
 }
 
 }  // namespace

@@ -7,6 +7,12 @@
 #include <limits>
 #include <random>
 
+/// teem keeps a few dozen bytes of some headers that it refuses; what it does with ours is measured here, not
+/// its memory.
+extern "C" const char* __lsan_default_suppressions() {
+    return "leak:libteem";
+}
+
 namespace squint {
 namespace {
 
@@ -235,10 +241,12 @@ TEST_F(Nrrd, RefusesWhatIsNoNrrd) {
     EXPECT_EQ(refusal_of(folder.string()), folder.string() + ": cannot read: not a regular file");
     EXPECT_EQ(refusal_of(file("a.nrrd", "P5 2 2")), "a.nrrd: no NRRD: the file does not begin with \"NRRD\"");
     EXPECT_EQ(refusal_of(file("a.nrrd", "")), "a.nrrd: no NRRD: the file does not begin with \"NRRD\"");
+    EXPECT_THAT(refusal_of(file("a.nrrd", "NRRD0009\ntype: uchar\n\n")),
+                HasSubstr("version is \"NRRD0009\", but NRRD0001 to NRRD0005 are allowed"));
     EXPECT_THAT(refusal_of(file("a.nrrd", "NRRD0004\ntype: uchar\n")),
                 HasSubstr("without the blank line that ends it"));
-    EXPECT_THAT(refusal_of(file("a.nrrd", "NRRD0004\n# \0\n\n" + std::string(1, '\0') + "\n\n")),
-                StartsWith("a.nrrd: NRRD header"));
+    EXPECT_EQ(refusal_of(file("a.nrrd", "NRRD0004\n# " + std::string(1, '\0') + "\n\n")),
+              "a.nrrd: NRRD header holds a byte of zero, but must be text");
     EXPECT_THAT(refusal_of(file("a.nrrd", "NRRD0004\n" + std::string(3 << 20, 'x'))),
                 HasSubstr("without the blank line"));
 }

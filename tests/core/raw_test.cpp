@@ -96,6 +96,9 @@ TEST_F(Raw, APipeIsNoFile) {
 
 // 2^32 + 2^16 voxels in a sparse file: takes no disk, and the last voxel's index needs 33 bits.
 TEST_F(Raw, MoreThanFourBillionVoxelsAreMapped) {
+#ifdef __SANITIZE_ADDRESS__
+    GTEST_SKIP() << "takes a minute under the address sanitizer";
+#endif
     const std::string path = file("big.raw", "");
     const Index3 dims(65536, 65537, 1);
     const int descriptor = open(path.c_str(), O_WRONLY);

@@ -29,6 +29,7 @@ class VolumeFiles : public testing::Test {
 
     /// Writes a file and gives its path.
     std::string file(const std::string& name, const std::string& bytes) const {
+        std::filesystem::remove(folder / name);  // a new file: truncating an old one waits for the disk
         std::ofstream(folder / name, std::ios::binary) << bytes;
         return (folder / name).string();
     }
