@@ -18,7 +18,7 @@ enum class MeanOf { opacity_kye, clamped_extinction_engel };
 
 struct PreIntegrated1D {
     MeanOf mean = MeanOf::opacity_kye;
-    double length = 1;          // world units: the tables are for slabs of this length
+    double length = 1;            // world units: the tables are for slabs of this length
     std::vector<double> value{};  // a_i or min(tau_i d, 1)
     Channels colored{};           // value_i c_i
     std::vector<double> sum{};    // prefix integral of value over the coordinate: sum[0] = 0, trapezoids

@@ -23,6 +23,7 @@ struct Grid {
     int size = 0;               // nodes
     double spacing = 0;         // entries from node to node
     double length = 0;          // world units
+    int stretches = 0;          // one less than points
     std::vector<double> width;  // of the stretch behind each point, in entries
     std::vector<double> extinction;
     Channels color;
@@ -34,8 +35,7 @@ struct Grid {
     double deepest = 0;             // largest extinction * width of a stretch
     bool any_wall = false;
 
-    int stretches() const { return static_cast<int>(width.size()); }
-    bool one_stretch_per_node() const { return stretches() == size - 1; }
+    bool one_stretch_per_node() const { return stretches == size - 1; }
 };
 
 /// Exact on entries, so that a node there meets a wall that stands there.
@@ -87,6 +87,10 @@ Grid make_grid(const Entries& entries, int size, double length) {
         }
     }
     grid.any_wall = walls > 0;
+    grid.stretches = static_cast<int>(points.size()) - 1;
+    for (auto* array :
+         {&grid.width, &grid.extinction, &grid.color[0], &grid.color[1], &grid.color[2], &grid.depth})
+        array->resize(array->size() + kPadding);
     return grid;
 }
 
@@ -95,8 +99,9 @@ struct Terms {
     std::vector<double> up_transparency, down_transparency;
     Channels up, down;
 
-    explicit Terms(std::size_t count = 0) : up_transparency(count), down_transparency(count) {
-        for (int k = 0; k < 3; ++k) up[k].resize(count), down[k].resize(count);
+    explicit Terms(std::size_t count = 0)
+        : up_transparency(count + kPadding), down_transparency(count + kPadding) {
+        for (int k = 0; k < 3; ++k) up[k].resize(count + kPadding), down[k].resize(count + kPadding);
     }
 };
 
@@ -104,12 +109,12 @@ class DiagonalSolver final : public Pi2dDiagonal {
   public:
     explicit DiagonalSolver(const Grid& grid)
         : grid_(grid),
-          fine_(grid.stretches()),
+          fine_(grid.stretches),
           joined_(grid.one_stretch_per_node() ? 0 : grid.size - 1),
-          transparency_(grid.size) {
+          transparency_(grid.size + kPadding) {
         for (auto* side : {&up_, &down_})
-            for (auto& plane : *side) plane.resize(grid.size);
-        if (grid.any_wall) down_transparency_.resize(grid.size);
+            for (auto& plane : *side) plane.resize(grid.size + kPadding);
+        if (grid.any_wall) down_transparency_.resize(grid.size + kPadding);
     }
 
     const double* up(int k) const override { return up_[k].data(); }
@@ -124,10 +129,8 @@ class DiagonalSolver final : public Pi2dDiagonal {
         const int count = grid_.size - m;
         slab_opacities(grid_.depth.data(), m, count, rate, transparency_.data(), up_[3].data());
         if (grid_.any_wall) hide_behind_walls(m, count);
-        for (int k = 0; k < 3; ++k) {
-            run_up(m, count, k);
-            run_down(m, count, k);
-        }
+        start_lights(m, count);
+        add_lights(m, count);
         if (grid_.any_wall) overwrite_walls(m, count);
     }
 
@@ -147,7 +150,7 @@ class DiagonalSolver final : public Pi2dDiagonal {
 
     void solve_terms(double rate) {
         Stretches s;
-        s.count = grid_.stretches();
+        s.count = grid_.stretches;
         s.width = grid_.width.data();
         s.extinction = grid_.extinction.data();
         s.transparency = fine_.up_transparency.data();
@@ -164,7 +167,7 @@ class DiagonalSolver final : public Pi2dDiagonal {
 
     /// A stretch that arrives at a wall ends in its colour and lets nothing through.
     void close_stretches_at_walls() {
-        for (int i = 0; i < grid_.stretches(); ++i) {
+        for (int i = 0; i < grid_.stretches; ++i) {
             if (grid_.wall[i + 1]) {
                 for (int k = 0; k < 3; ++k)
                     fine_.up[k][i] += fine_.up_transparency[i] * grid_.color[k][i + 1];
@@ -218,40 +221,52 @@ class DiagonalSolver final : public Pi2dDiagonal {
         }
     }
 
-    /// C(f) = E_f C(f + 1) + K_f - P_f K_(f + m), from the last node down; before f = size - 1 - m nothing is
-    /// dropped.
-    void run_up(int m, int count, int k) {
-        const double* const light = terms().up[k].data();
-        const double* const through = terms().up_transparency.data();
-        double* const out = up_[k].data();
-        double color = 0;
-        for (int f = grid_.size - 2; f >= count; --f) color = light[f] + through[f] * color;
-        subtract_dropped(light, transparency_.data(), light + m, count - 1, out);
-        out[count - 1] = light[count - 1];
-        for (int f = count - 1; f >= 0; --f) out[f] = color = out[f] + through[f] * color;
-        clamp_to_opacity(out, up_[3].data(), count);
+    const double* through_down() const {
+        const bool same = !grid_.any_wall && grid_.one_stretch_per_node();
+        return same ? terms().up_transparency.data() : terms().down_transparency.data();
     }
 
-    /// The same from the other side: slabs from f + m down to f, the stretch below f dropped.
-    void run_down(int m, int count, int k) {
-        const double* const light = terms().down[k].data();
-        const Terms& t = terms();
-        const bool same = !grid_.any_wall && grid_.one_stretch_per_node();
-        const double* const through = same ? t.up_transparency.data() : t.down_transparency.data();
-        const double* const slab_through = grid_.any_wall ? down_transparency_.data() : transparency_.data();
-        double* const out = down_[k].data();
-        double color = 0;
-        for (int j = 0; j + 1 < m; ++j) color = light[j] + through[j] * color;
-        subtract_dropped(light + m, slab_through + 1, light, count - 1, out + 1);
-        out[0] = light[m - 1];
-        for (int f = 0; f < count; ++f) out[f] = color = out[f] + through[f + m - 1] * color;
-        clamp_to_opacity(out, down(3), count);
+    /// K_f - P_f K_(f + m) upwards, and the same from the other side; nothing is dropped at the first slab of
+    /// full length.
+    void start_lights(int m, int count) {
+        const double* const slab_down = grid_.any_wall ? down_transparency_.data() : transparency_.data();
+        for (int k = 0; k < 3; ++k) {
+            const double *const light_up = terms().up[k].data(), *const light_down = terms().down[k].data();
+            subtract_dropped(light_up, transparency_.data(), light_up + m, count - 1, up_[k].data());
+            up_[k][count - 1] = light_up[count - 1];
+            subtract_dropped(light_down + m, slab_down + 1, light_down, count - 1, down_[k].data() + 1);
+            down_[k][0] = light_down[m - 1];
+        }
+    }
+
+    /// C(f) = E_f C(f + 1) + ... from the last node down, and from the first node up: six chains hide each
+    /// other's latency.
+    void add_lights(int m, int count) {
+        const double *const e_up = terms().up_transparency.data(), *const e_down = through_down();
+        double up[3] = {0, 0, 0}, down[3] = {0, 0, 0};
+        for (int i = 0; i < m - 1; ++i) {
+            const int f = grid_.size - 2 - i;
+            for (int k = 0; k < 3; ++k) {
+                up[k] = terms().up[k][f] + e_up[f] * up[k];
+                down[k] = terms().down[k][i] + e_down[i] * down[k];
+            }
+        }
+        double* const out_up[3] = {up_[0].data(), up_[1].data(), up_[2].data()};
+        double* const out_down[3] = {down_[0].data(), down_[1].data(), down_[2].data()};
+        const double *const alpha_up = this->up(3), *const alpha_down = this->down(3);
+        for (int i = 0; i < count; ++i) {
+            const int f = count - 1 - i;
+            for (int k = 0; k < 3; ++k) {
+                up[k] = out_up[k][f] + e_up[f] * up[k];
+                down[k] = out_down[k][i] + e_down[i + m - 1] * down[k];
+                out_up[k][f] = within(up[k], alpha_up[f]);
+                out_down[k][i] = within(down[k], alpha_down[i]);
+            }
+        }
     }
 
     /// Rounding may leave a colour 1e-12 outside.
-    static void clamp_to_opacity(double* color, const double* alpha, int count) {
-        for (int f = 0; f < count; ++f) color[f] = std::min(std::max(color[f], 0.0), alpha[f]);
-    }
+    static double within(double color, double alpha) { return std::min(std::max(color, 0.0), alpha); }
 
     const Grid& grid_;
     Terms fine_, joined_;

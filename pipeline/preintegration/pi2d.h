@@ -13,6 +13,7 @@
 
 #include "pipeline/preintegration/linear_entries.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -26,7 +27,7 @@ enum class Lookup { nearest, bilinear };
 struct PreIntegrated2D {
     int size = 0;
     int entries = 0;
-    double length = 1;         // world units: the cells are for slabs of this length
+    double length = 1;           // world units: the cells are for slabs of this length
     std::vector<double> cell{};  // size * size * 4
     Lookup lookup = Lookup::bilinear;
 
@@ -56,7 +57,7 @@ class Pi2dDiagonal {
     virtual ~Pi2dDiagonal() = default;
 };
 
-inline constexpr int kDiagonalsPerGroup = 8;
+inline constexpr int kDiagonalsPerGroup = 16;
 
 /// Calls `group(first, count, diagonal, scratch)` for groups of neighbouring diagonals, 0 <= m < size, in
 /// parallel on TBB's threads.  `scratch` belongs to the thread and keeps its size between calls.
@@ -86,30 +87,32 @@ void build_pi2d_words(const Entries& entries, int size, double length, std::span
     };
     Cell* const table = reinterpret_cast<Cell*>(cells.data());
     const auto group = [&](int first, int count, Pi2dDiagonal& diagonal, std::vector<std::byte>& scratch) {
-        // Encode each diagonal into planes, then write cells row by row, so that a row's `count` neighbours
-        // go out together.
+        // Encode each diagonal, then write cells row by row, so that a row's neighbours go out together.
         const std::size_t plane = size;
-        scratch.resize(sizeof(Word) * plane * 8 * kDiagonalsPerGroup);
-        Word* const words = reinterpret_cast<Word*>(scratch.data());
+        scratch.resize(plane * (4 * sizeof(Word) + 2 * kDiagonalsPerGroup * sizeof(Cell)));
+        Cell* const lanes = reinterpret_cast<Cell*>(scratch.data());
+        Word* const words = reinterpret_cast<Word*>(lanes + 2 * kDiagonalsPerGroup * plane);
+        const auto pack = [&](auto&& values, std::size_t count, Cell* out) {
+            for (int k = 0; k < 4; ++k)
+                encode(k, std::span(values(k), count), std::span(words + k * plane, count));
+            for (std::size_t f = 0; f < count; ++f)
+                out[f] = {{words[f], words[plane + f], words[2 * plane + f], words[3 * plane + f]}};
+        };
         for (int lane = 0; lane < count; ++lane) {
             diagonal.solve(first + lane);
-            const std::size_t cells_here = size - first - lane;
-            for (int k = 0; k < 4; ++k) {
-                Word* const up = words + (lane * 8 + k) * plane;
-                encode(k, std::span(diagonal.up(k), cells_here), std::span(up, cells_here));
-                encode(k, std::span(diagonal.down(k), cells_here), std::span(up + 4 * plane, cells_here));
-            }
+            const std::size_t here = size - first - lane;
+            pack([&](int k) { return diagonal.up(k); }, here, lanes + 2 * lane * plane);
+            pack([&](int k) { return diagonal.down(k); }, here, lanes + (2 * lane + 1) * plane);
         }
-        const auto cell = [&](int lane, int direction, int f) {
-            const Word* const w = words + (lane * 8 + direction * 4) * plane + f;
-            return Cell{{w[0], w[plane], w[2 * plane], w[3 * plane]}};
-        };
         for (int row = 0; row < size; ++row) {
-            Cell* const cells_of_row = table + static_cast<std::size_t>(row) * size;
-            for (int lane = 0; lane < count; ++lane) {
-                const int m = first + lane;
-                if (row + m < size) cells_of_row[row + m] = cell(lane, 0, row);
-                if (row >= m) cells_of_row[row - m] = cell(lane, 1, row - m);
+            Cell* const cells_of_row = table + row * plane;
+            const int up_end = std::min(count, size - row - first),
+                      down_end = std::min(count, row - first + 1);
+            for (int lane = 0; lane < up_end; ++lane)
+                cells_of_row[row + first + lane] = lanes[2 * lane * plane + row];
+            for (int lane = 0; lane < down_end; ++lane) {
+                const int column = row - first - lane;
+                cells_of_row[column] = lanes[(2 * lane + 1) * plane + column];
             }
         }
     };

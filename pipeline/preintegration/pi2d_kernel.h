@@ -1,10 +1,15 @@
-// The vector loops of PI2D's exact O(n^2) build: plain double arithmetic without contraction, compiled once
+// The vector loops of PI2D's exact O(n^2) build: double arithmetic without contraction, compiled once
 // per SIMD target, so every target gives the same bits.
 #pragma once
 
 #include <array>
 
+// Loops run over whole vectors: every array but encode_u16's has kPadding readable and writable values behind
+// its last one.
+
 namespace squint::preintegration {
+
+inline constexpr int kPadding = 16;
 
 /// `count` stretches between count + 1 nodes, seen at one rate.  All arrays are the caller's.
 struct Stretches {

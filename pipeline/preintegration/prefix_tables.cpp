@@ -22,10 +22,16 @@ double power(double base, int exponent) {
 
 }  // namespace
 
-struct PrefixTables::Place {
-    int entry;
-    double fraction;  // in [0, 1]; 1 only at the last entry
-};
+void Moments::append(const Moments& behind, int count) {
+    for (int k = 0; k < count; ++k) {
+        double binomial = 1;
+        for (int low = 0; low <= k; ++low) {
+            q[k] += behind.q[low] * (binomial * power(depth, k - low));
+            binomial = binomial * (k - low) / (low + 1);
+        }
+    }
+    depth += behind.depth;
+}
 
 PrefixTables::Place PrefixTables::place(double s) const {
     if (size() == 1) return {0, 0};
@@ -97,6 +103,19 @@ Vec3 PrefixTables::moment_between(double front, double back) const {
     return moment_at(1, back) - moment_at(1, front);
 }
 
+double PrefixTables::coordinate_at(double target) const {
+    const auto above = std::lower_bound(depth.begin(), depth.end(), target);
+    if (above == depth.begin()) return 0;
+    if (above == depth.end()) return size() - 1;
+    const int i = static_cast<int>(above - depth.begin()) - 1;
+    const double t = target - depth[i];
+    if (between == Between::piecewise) return i + t / (depth[i + 1] - depth[i]);
+    // tau_0 u + (tau_1 - tau_0) u^2 / 2 = t, in the form that does not cancel.
+    const double tau = extinction[i], slope = extinction[i + 1] - tau;
+    const double root = std::sqrt(std::max(tau * tau + 2 * slope * t, 0.0));
+    return i + std::min(2 * t / (tau + root), 1.0);
+}
+
 Moments PrefixTables::inside_one_entry(int i, double u0, double u1, double rate, int count) const {
     Moments result;
     result.depth = rate * partial_depth(i, u0, u1);
@@ -127,26 +146,58 @@ Moments PrefixTables::moments(double front, double back, double length, int coun
     return result;
 }
 
+namespace {
+
+/// Steps of T, X_1 and X_2 over one entry, tau and c linear: closed forms, so that the tables of PIPS(1) and
+/// LEG(2) build fast.
+struct Step {
+    double tau0, tau1, depth, square;  // square = int t^2 du, t the depth from the entry's start
+
+    Step(double t0, double t1)
+        : tau0(t0),
+          tau1(t1),
+          depth((t0 + t1) / 2),
+          square(t0 * t0 / 3 + t0 * (t1 - t0) / 4 + (t1 - t0) * (t1 - t0) / 20) {}
+
+    double first(double c0, double c1) const {
+        return (2 * c0 * tau0 + 2 * c1 * tau1 + c0 * tau1 + c1 * tau0) / 6;
+    }
+    /// 2 int c T dT with T = before + t; int u t dt by parts.
+    double second(double c0, double c1, double before) const {
+        return 2 * before * first(c0, c1) + c1 * depth * depth - (c1 - c0) * square;
+    }
+};
+
+}  // namespace
+
 PrefixTables build_prefix_tables(const Entries& entries, int orders, Between between) {
     assert(1 <= orders && orders <= kMostMoments);
     const int size = entries.size();
     PrefixTables tables;
-    tables.depth.assign(size, 0);
-    tables.moment.assign(orders, Channels{std::vector<double>(size, 0), std::vector<double>(size, 0),
-                                          std::vector<double>(size, 0)});
-    for (const Entry& entry : entries.entry) {
-        tables.extinction.push_back(entry.extinction);
-        for (int channel = 0; channel < 3; ++channel) tables.color[channel].push_back(entry.color[channel]);
+    tables.depth.resize(size);
+    tables.extinction.resize(size);
+    for (auto& channel : tables.color) channel.resize(size);
+    tables.moment.resize(orders);
+    for (auto& x : tables.moment)
+        for (auto& channel : x) channel.resize(size);
+    for (int i = 0; i < size; ++i) {
+        tables.extinction[i] = entries.entry[i].extinction;
+        for (int channel = 0; channel < 3; ++channel)
+            tables.color[channel][i] = entries.entry[i].color[channel];
     }
+    double depth = 0;
+    Vec3 x1(0, 0, 0), x2(0, 0, 0);
     for (int i = 0; i + 1 < size; ++i) {
-        const double t0 = tables.extinction[i], t1 = tables.extinction[i + 1];
-        tables.depth[i + 1] = tables.depth[i] + (t0 + t1) / 2;
+        const Step step(tables.extinction[i], tables.extinction[i + 1]);
         for (int channel = 0; channel < 3; ++channel) {
             const double c0 = tables.color[channel][i], c1 = tables.color[channel][i + 1];
-            auto& x1 = tables.moment[0][channel];
-            x1[i + 1] = x1[i] + (2 * c0 * t0 + 2 * c1 * t1 + c0 * t1 + c1 * t0) / 6;
+            tables.moment[0][channel][i + 1] = x1[channel] += step.first(c0, c1);
+            if (orders >= 2) tables.moment[1][channel][i + 1] = x2[channel] += step.second(c0, c1, depth);
         }
-        for (int k = 2; k <= orders; ++k) {
+        tables.depth[i + 1] = depth += step.depth;
+    }
+    for (int k = 3; k <= orders; ++k) {
+        for (int i = 0; i + 1 < size; ++i) {
             const Vec3 step = tables.partial_moments(i, 0, 1, k - 1, tables.depth[i]) * k;
             for (int channel = 0; channel < 3; ++channel) {
                 auto& x = tables.moment[k - 1][channel];

@@ -24,6 +24,9 @@ struct Moments {
     std::array<Vec3, kMostMoments> q;
 
     Moments() { q.fill(Vec3(0, 0, 0)); }
+
+    /// Puts `behind` at this one's back, `count` moments: sums of positive terms.
+    void append(const Moments& behind, int count);
 };
 
 struct PrefixTables {
@@ -45,6 +48,9 @@ struct PrefixTables {
     double depth_between(double front, double back) const;
     Vec3 moment_between(double front, double back) const;
 
+    /// The coordinate at which T reaches `depth`, 0 <= depth <= total_depth(); the first such one.
+    double coordinate_at(double depth) const;
+
     /// Moments q[0 .. count-1] of the slab, front != back.  Inside one entry they are integrated; across
     /// entries q[k >= 1] is the difference of raw prefixes (equations 23, 24 with MATH's signs): it cancels
     /// like 2^-53 (r T)^(k + 1).
@@ -54,13 +60,19 @@ struct PrefixTables {
     /// - T[i]^k); the mean of the two colours where nothing absorbs.
     Vec3 piece_color(int k, int i) const;
 
-    /// Over the fractions [u0, u1] of entry i, without any prefix: int tau, and int c (offset + T(u) - T(u0))^exponent dT.
+    /// Over the fractions [u0, u1] of entry i, without any prefix: int tau, and int c (offset + T(u) -
+    /// T(u0))^exponent dT.
     double partial_depth(int i, double u0, double u1) const;
     Vec3 partial_moments(int i, double u0, double u1, int exponent, double offset) const;
 
-  private:
-    struct Place;
+    /// The entry at or below s (at most size() - 2), and s as a fraction of it, in [0, 1].
+    struct Place {
+        int entry;
+        double fraction;
+    };
     Place place(double s) const;
+
+    /// Moments of the fractions u0 -> u1 of entry i at a signed rate: integrated, no prefix.
     Moments inside_one_entry(int i, double u0, double u1, double rate, int count) const;
 };
 
