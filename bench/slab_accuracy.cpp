@@ -185,6 +185,13 @@ void print_json(const std::vector<Row>& rows) {
     std::printf("]\n");
 }
 
+/// Two decimals below 10, none from 100 on.
+std::string lsb8(double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, value < 9.995 ? "%.2f" : value < 99.95 ? "%.1f" : "%.0f", value);
+    return text;
+}
+
 /// One table per width and reach; rows come function by function, methods within.
 void print_markdown(const std::vector<Row>& rows) {
     for (std::size_t begin = 0; begin < rows.size();) {
@@ -207,7 +214,8 @@ void print_markdown(const std::vector<Row>& rows) {
             std::printf("\n| %s |", name.c_str());
             for (std::size_t i = begin; i < end; ++i)
                 if (rows[i].method == name)
-                    std::printf(" %.2g/%.2g |", rows[i].error.color_rms, rows[i].error.color_max);
+                    std::printf(" %s/%s |", lsb8(rows[i].error.color_rms).c_str(),
+                                lsb8(rows[i].error.color_max).c_str());
         }
         std::printf("\n");
         begin = end;

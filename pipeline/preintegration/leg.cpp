@@ -48,7 +48,7 @@ double legendre_weight(int j, double x) {
 }
 
 double legendre_split_depth(int order) {
-    constexpr std::array<double, kMostLegendre> kDepth = {0.125, 1.5, 1.5, 5};
+    constexpr std::array<double, kMostLegendre> kDepth = {0.125, 1.5, 1.5, 2.5};
     return kDepth[order - 1];
 }
 

@@ -19,8 +19,8 @@ inline constexpr int kMostLegendre = 4;
 /// W_j(x) = x e^(-x/2) i_j(x/2), x >= 0, j < kMostLegendre; relative error below 1e-14.  W_0 = 1 - e^-x.
 double legendre_weight(int j, double x);
 
-/// The depth up to which n moments stay within half an LSB8 for a colour swing of 1 (MATH.md, B2):
-/// 0.125, 1.5, 1.5, 5.
+/// The depth at which a slab is cut: 0.125, 1.5, 1.5, 2.5.  Up to 0.125, 1.7, 1.7 and 5.2 the three profiles
+/// of MATH B2 stay within half an LSB8; order 4 needs less on noise (docs/measurements/slab-accuracy.md).
 double legendre_split_depth(int order);
 
 /// C of a slab from its moments, depth > 0; no clamp, no split.
