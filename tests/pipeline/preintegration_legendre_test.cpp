@@ -6,6 +6,7 @@
 
 #include "pipeline/preintegration/exact_slab.h"
 #include "pipeline/preintegration/leg.h"
+#include "pipeline/preintegration/overlapped_tables.h"
 #include "tests/pipeline/preintegration_cases.h"
 
 namespace squint::preintegration {
@@ -194,6 +195,48 @@ TEST(DisjointTables, KeepTheirAccuracyAtAMillionDeep) {
         for (int k = 0; k < 4; ++k)
             EXPECT_LE((a.q[k] - b.q[k]).length(), 1e-9);  // 4000 + front rounds s by 5e-13
     }
+}
+
+TEST(OverlappedTables, EqualTheDisjointTables) {
+    const Entries entries = cases::noise(50, 0.01, 3, 40);
+    const DisjointTables disjoint = build_disjoint_tables(entries, 4);
+    const OverlappedTables overlapped = build_overlapped_tables(entries, 4);
+    for (const bool on_entries : {true, false}) {
+        for (const auto& [front, back, length] : cases::slabs(50, 400, on_entries, 41)) {
+            if (std::abs(back - front) < 1e-3) continue;
+            const Moments a = overlapped.moments(front, back, length, 4),
+                          b = disjoint.moments(front, back, length, 4);
+            EXPECT_NEAR(a.depth, b.depth, 1e-12);
+            // Four slabs of at most 3 d deep, r at most 2 per whole entry: (4 * 6)^(k+1) 2^-53 times the 8
+            // terms of a shift.
+            for (int k = 0; k < 4; ++k)
+                EXPECT_LE((a.q[k] - b.q[k]).length(), std::ldexp(8 * std::pow(24, k + 1), -53) + 1e-13);
+        }
+    }
+}
+
+TEST(OverlappedTables, LoseWhatTheirWordsLose) {
+    // Even matter: every block of a level is alike, and a slab is at least a quarter of its block.
+    const Entries entries = cases::entries_of(200, [](int i) { return cases::Matter{0.5, grey(i % 2)}; });
+    const OverlappedTables exact = build_overlapped_tables(entries, 2),
+                           coarse = build_overlapped_tables(entries, 2, 16),
+                           fine = build_overlapped_tables(entries, 2, 24);
+    double worst_coarse = 0, worst_fine = 0;
+    for (const auto& [front, back, length] : cases::slabs(200, 400, true, 42)) {
+        if (front == back) continue;
+        const auto error = [&](const OverlappedTables& tables) {
+            const Vec3 a = legendre_color(tables.moments(front, back, 1, 2), 2),
+                       b = legendre_color(exact.moments(front, back, 1, 2), 2);
+            return std::abs(a.x - b.x) * 255;
+        };
+        worst_coarse = std::max(worst_coarse, error(coarse));
+        worst_fine = std::max(worst_fine, error(fine));
+    }
+    // A word's half unit is 2^-17 of a scale of at most 2 * 4 x (and twice that squared for k = 1), x = 0.5;
+    // LEG's factors 3 and 2 and two ends: 255 * 2^-17 * 40 = 0.08 LSB8; 8 bits more take 256 off.
+    EXPECT_GT(worst_coarse, 0);
+    EXPECT_LE(worst_coarse, 0.08);
+    EXPECT_LE(worst_fine, 0.08 / 256);
 }
 
 }  // namespace
