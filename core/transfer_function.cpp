@@ -15,17 +15,29 @@ namespace {
 constexpr int kDefaultEntries = 4096;
 constexpr int kMostEntries = 1 << 16;
 
-/// Piecewise linear between ascending points, constant outside; at a step the later point holds.
+/// Piecewise linear between ascending points, constant outside; at a step the later point holds.  Remembers
+/// where it was, so that values in order cost no search.
 template <class Point, class Value>
-Value interpolate(const std::vector<Point>& points, Value Point::*part, double value) {
-    const auto after = std::upper_bound(points.begin(), points.end(), value,
-                                        [](double v, const Point& p) { return v < p.value; });
-    if (after == points.begin()) return points.front().*part;
-    const Point& before = *(after - 1);
-    if (after == points.end() || before.value == value) return before.*part;
-    const double weight = (value - before.value) / (after->value - before.value);
-    return before.*part + ((*after).*part - before.*part) * weight;
-}
+class Curve {
+  public:
+    Curve(const std::vector<Point>& points, Value Point::*part) : points_(points), part_(part) {}
+
+    Value operator()(double value) {
+        while (after_ < points_.size() && points_[after_].value <= value) ++after_;
+        while (after_ > 0 && points_[after_ - 1].value > value) --after_;
+        if (after_ == 0) return points_.front().*part_;
+        const Point& before = points_[after_ - 1];
+        if (after_ == points_.size() || before.value == value) return before.*part_;
+        const Point& after = points_[after_];
+        const double weight = (value - before.value) / (after.value - before.value);
+        return before.*part_ + (after.*part_ - before.*part_) * weight;
+    }
+
+  private:
+    const std::vector<Point>& points_;
+    Value Point::*part_;
+    std::size_t after_ = 0;  // the first point whose value is greater
+};
 
 bool in_unit_range(double x) {
     return x >= 0 && x <= 1;
@@ -51,10 +63,10 @@ void check_ascending(const std::vector<Point>& points, const std::string& name) 
 }  // namespace
 
 Vec3 TransferFunction::color_at(double value) const {
-    return interpolate(color, &ColorPoint::color, value);
+    return Curve(color, &ColorPoint::color)(value);
 }
 double TransferFunction::alpha_at(double value) const {
-    return interpolate(opacity, &OpacityPoint::alpha, value);
+    return Curve(opacity, &OpacityPoint::alpha)(value);
 }
 
 bool Entries::any_opaque() const {
@@ -93,11 +105,13 @@ Entries sample_entries(const TransferFunction& function, const Volume& volume) {
     entries.unit_distance = function.unit_distance;
     entries.scalars_per_entry = static_cast<double>(std::max<std::int64_t>(levels - 1, 1)) / (count - 1);
     entries.entry.resize(static_cast<std::size_t>(count));
+    Curve color(function.color, &ColorPoint::color);
+    Curve alpha(function.opacity, &OpacityPoint::alpha);
     for (int i = 0; i < count; ++i) {
         Entry& entry = entries.entry[static_cast<std::size_t>(i)];
         const double value = volume.value_scale * (i * entries.scalars_per_entry) + volume.value_offset;
-        entry.color = function.color_at(value);
-        entry.alpha = function.alpha_at(value);
+        entry.color = color(value);
+        entry.alpha = alpha(value);
         entry.opaque = entry.alpha == 1;
         const double capped = std::min(entry.alpha, kLargestTranslucentAlpha);
         entry.extinction = (0 - portable::log1p(-capped)) / function.unit_distance;  // never a negative zero
