@@ -1,0 +1,61 @@
+#include "pipeline/reference_light.h"
+
+#include "core/portable_math.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace squint::reference {
+namespace {
+
+double unit_clamped(double x) {
+    return std::clamp(x, 0.0, 1.0);
+}
+
+double power(const ShadingSettings& s, double x) {
+    if (s.power == PowerRule::parabola) return std::max(0.0, 1 - (s.exponent + 1) / 2 * (1 - x));
+    double exponent = s.exponent;
+    while (exponent > 1 && std::fmod(exponent, 2) == 0) x *= x, exponent /= 2;
+    return exponent == 1 ? x : portable::pow(x, exponent);
+}
+
+}  // namespace
+
+RayLight::RayLight(const Scene& scene, const Camera& camera, const Vec3& ray_direction)
+    : settings_(&scene.shading), eye_(-ray_direction) {
+    for (const Light& light : scene.lights) {
+        const Vec3 towards = light.headlight ? -camera.view : light.direction.normalized();
+        lamp_[lamps_++] = {towards, (towards + eye_).normalized(), light.color};
+    }
+}
+
+Reflection RayLight::operator()(const Vec3& gradient) const {
+    const ShadingSettings& s = *settings_;
+    Vec3 diffuse{0, 0, 0}, specular{0, 0, 0};
+    const double length = std::sqrt(gradient.dot(gradient));
+    if (length > 0) {
+        const Vec3 normal = gradient * (-1 / length);
+        for (std::size_t l = 0; l < lamps_; ++l) {
+            const Lamp& lamp = lamp_[l];
+            double facing = normal.dot(lamp.towards);
+            double highlight = normal.dot(lamp.half);
+            if (s.model == ShadingModel::phong) {  // R.V, R the light mirrored about N; N or -N is the same
+                highlight = 2 * facing * normal.dot(eye_) - lamp.towards.dot(eye_);
+                if (facing < 0 && !s.two_sided) highlight = 0;
+            } else if (s.two_sided) {
+                highlight = std::abs(highlight);
+            }
+            if (s.two_sided) facing = std::abs(facing);
+            diffuse += lamp.color * unit_clamped(facing);
+            specular += lamp.color * power(s, unit_clamped(highlight));
+        }
+    }
+    Reflection reflection;
+    for (int c = 0; c < 3; ++c) {
+        reflection.diffuse[c] = unit_clamped(s.ka + s.kd * unit_clamped(diffuse[c]));
+        reflection.specular[c] = s.ks * unit_clamped(specular[c]);
+    }
+    return reflection;
+}
+
+}  // namespace squint::reference

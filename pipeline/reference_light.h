@@ -1,0 +1,33 @@
+// The light of CONVENTIONS.md in doubles, for the reference: straight from its equations.
+#pragma once
+
+#include "core/camera.h"
+#include "pipeline/scene.h"
+
+#include <array>
+
+namespace squint::reference {
+
+/// What a gradient makes of the light: matter of colour c shines with c * diffuse + specular.
+struct Reflection {
+    Vec3 diffuse{1, 1, 1}, specular{0, 0, 0};
+};
+
+/// The lights as one ray meets them.
+class RayLight {
+  public:
+    RayLight(const Scene& scene, const Camera& camera, const Vec3& ray_direction);
+    /// `gradient` in world space, of any length.  A zero gradient gets ambient light only.
+    Reflection operator()(const Vec3& gradient) const;
+
+  private:
+    struct Lamp {
+        Vec3 towards, half, color;
+    };
+    const ShadingSettings* settings_;
+    Vec3 eye_;  // towards it
+    std::array<Lamp, kMostLights> lamp_;
+    std::size_t lamps_ = 0;
+};
+
+}  // namespace squint::reference
