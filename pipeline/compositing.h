@@ -11,6 +11,7 @@
 #include "fixedpoint/words.h"
 #include "pipeline/scene.h"
 
+#include <algorithm>
 #include <array>
 
 namespace squint {
@@ -109,10 +110,8 @@ HWY_INLINE void composite(const CompositingStage& s, Accumulated<W>& pixel, std:
                 s.premultiplied ? quantise(color[c] * t, s.to_color) : quantise(color[c] * w, s.to_color);
             pixel.color[c] = quantise(pixel.color[c] + share, s.to_color_sum);
         }
-        const int finer =
-            max(std::int64_t{s.contribution_fraction - s.transparency_fraction}, std::int64_t{0});
-        const int coarser =
-            max(std::int64_t{s.transparency_fraction - s.contribution_fraction}, std::int64_t{0});
+        const int finer = std::max(s.contribution_fraction - s.transparency_fraction, 0);
+        const int coarser = std::max(s.transparency_fraction - s.contribution_fraction, 0);
         t = quantise(shift_left(t, finer) - shift_left(w, coarser), s.to_transparency);
         return;
     }

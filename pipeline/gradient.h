@@ -61,15 +61,15 @@ HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
 /// Twice the central difference along an axis at one voxel of the neighbourhood: v(+1) - v(-1).
-template <class W>
-HWY_INLINE W central_difference(const Neighbourhood<W>& n, int x, int y, int z, int axis) {
+template <class N>
+HWY_INLINE auto central_difference(const N& n, int x, int y, int z, int axis) {
     const int dx = axis == 0, dy = axis == 1, dz = axis == 2;
     return n.at(x + dx, y + dy, z + dz) - n.at(x - dx, y - dy, z - dz);
 }
 
 /// 32 times the Sobel gradient along an axis at one voxel: (-1 0 1) along it, (1 2 1) across it twice.
-template <class W>
-HWY_INLINE W sobel_difference(const Neighbourhood<W>& n, int x, int y, int z, int axis) {
+template <class W, class N>
+HWY_INLINE W sobel_difference(const N& n, int x, int y, int z, int axis) {
     W sum = constant<W>(0);
     for (int a = -1; a <= 1; ++a)
         for (int b = -1; b <= 1; ++b) {
@@ -83,13 +83,13 @@ HWY_INLINE W sobel_difference(const Neighbourhood<W>& n, int x, int y, int z, in
 }
 
 /// Differences at the cell's eight voxels, interpolated like a sample.
-template <class W>
-HWY_INLINE W interpolated_difference(const GradientStage& s, const Neighbourhood<W>& n,
-                                     const std::array<W, 3>& weight, int axis) {
+template <class W, class N>
+HWY_INLINE W interpolated_difference(const GradientStage& s, const N& n, const std::array<W, 3>& weight,
+                                     int axis) {
     std::array<W, 8> d;
     for (int i = 0; i < 8; ++i) {
         const int x = 1 + (i & 1), y = 1 + (i >> 1 & 1), z = 1 + (i >> 2);
-        d[static_cast<std::size_t>(i)] = s.rule == GradientRule::sobel ? sobel_difference(n, x, y, z, axis)
+        d[static_cast<std::size_t>(i)] = s.rule == GradientRule::sobel ? sobel_difference<W>(n, x, y, z, axis)
                                                                        : central_difference(n, x, y, z, axis);
     }
     const int bits = s.weight_bits;
@@ -102,9 +102,9 @@ HWY_INLINE W interpolated_difference(const GradientStage& s, const Neighbourhood
 
 /// The exact derivative of the trilinear cell along an axis: the four edges' differences, interpolated
 /// across.
-template <class W>
-HWY_INLINE W analytic_difference(const GradientStage& s, const Neighbourhood<W>& n,
-                                 const std::array<W, 3>& weight, int axis) {
+template <class W, class N>
+HWY_INLINE W analytic_difference(const GradientStage& s, const N& n, const std::array<W, 3>& weight,
+                                 int axis) {
     const auto corner = [&](int along, int a, int b) {
         const int x = axis == 0 ? along : a, y = axis == 1 ? along : (axis == 0 ? a : b),
                   z = axis == 2 ? along : b;
@@ -116,6 +116,13 @@ HWY_INLINE W analytic_difference(const GradientStage& s, const Neighbourhood<W>&
     const W b0 = lerp(edge(0, 0), edge(1, 0), weight[first], bits, s.to_first);
     const W b1 = lerp(edge(0, 1), edge(1, 1), weight[first], bits, s.to_first);
     return lerp(b0, b1, weight[second], bits, s.to_gradient);
+}
+
+/// A component of the gradient from the voxels about a cell, by the stage's rule.
+template <class W, class N>
+HWY_INLINE W voxel_difference(const GradientStage& s, const N& n, const std::array<W, 3>& weight, int axis) {
+    return s.rule == GradientRule::analytic ? analytic_difference(s, n, weight, axis)
+                                            : interpolated_difference(s, n, weight, axis);
 }
 
 /// Samples one voxel to either side along an axis: their difference, halved (Squeeze, section 4.3).

@@ -37,7 +37,9 @@ void put_word(Image& image, const char* name, std::size_t at, W word) {
 }
 
 template <class W>
-void store(const Plan& plan, const Pixel<W>& pixel, std::size_t at, Image& image) {
+void store(const Plan& plan, const Pixel<W>& pixel, int column, int row, Image& image) {
+    const std::size_t at = static_cast<std::size_t>(row) * static_cast<std::size_t>(image.width) +
+                           static_cast<std::size_t>(column);
     const std::array<double, 4> color = color_of(plan, pixel);
     put(image, "R", at, color[0]), put(image, "G", at, color[1]), put(image, "B", at, color[2]),
         put(image, "A", at, color[3]);
@@ -70,10 +72,7 @@ void cast_tile(const Plan& plan, int left, int top, int right, int bottom, Image
             for (int column = left; column < right; ++column) {
                 const RaySetup ray = plan.set_up(column, row);
                 const Pixel<W> pixel = cast_ray<W>(plan, method, ray);
-                store(plan, pixel,
-                      static_cast<std::size_t>(row) * static_cast<std::size_t>(image.width) +
-                          static_cast<std::size_t>(column),
-                      image);
+                store(plan, pixel, column, row, image);
                 statistics.rays += ray.slabs > 0;
                 statistics.samples += pixel.samples;
             }
@@ -81,6 +80,10 @@ void cast_tile(const Plan& plan, int left, int top, int right, int bottom, Image
 }
 
 }  // namespace
+
+void store_pixel(const Plan& plan, const Pixel<std::int64_t>& pixel, int column, int row, Image& image) {
+    store(plan, pixel, column, row, image);
+}
 
 void ModelRenderer::render_tile(int left, int top, int right, int bottom, Image& image,
                                 TileStatistics& statistics) const {

@@ -16,6 +16,12 @@ struct TileStatistics {
     std::unique_ptr<std::array<WireStatistics, kWires>> wires;  // with audit
 };
 
+template <class W>
+struct Pixel;
+
+/// A finished pixel into every channel of an image: where fixed point meets float.
+void store_pixel(const Plan& plan, const Pixel<std::int64_t>& pixel, int column, int row, Image& image);
+
 class ModelRenderer {
   public:
     explicit ModelRenderer(const Plan& plan, bool audit = false) : plan_(plan), audit_(audit) {}

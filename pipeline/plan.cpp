@@ -62,9 +62,9 @@ PresetInputs preset_inputs(const Plan& plan) {
     return in;
 }
 
-void apply_overrides(const Scene& scene, WireSpecs& specs) {
+void apply_overrides(const PrecisionSettings& precision, WireSpecs& specs) {
     for (int w = 0; w < kWires; ++w) {
-        const auto& text = scene.precision.override_[static_cast<std::size_t>(w)];
+        const auto& text = precision.override_[static_cast<std::size_t>(w)];
         if (!text) continue;
         const auto wire = static_cast<Wire>(w);
         if (const std::string wrong = parse_spec(*text, specs[wire]); !wrong.empty())
@@ -393,9 +393,7 @@ void choose_words(Plan& plan) {
                 Range& g = gradient[static_cast<std::size_t>(axis)];
                 g = plan.gradient.rule == GradientRule::central_samples
                         ? sample_difference(plan.gradient, sample, sample)
-                    : plan.gradient.rule == GradientRule::analytic
-                        ? analytic_difference(plan.gradient, near, position.weight, axis)
-                        : interpolated_difference(plan.gradient, near, position.weight, axis);
+                        : voxel_difference(plan.gradient, near, position.weight, axis);
                 g = to_world(plan.gradient, g, axis);
                 if (plan.needs_back) g = g + g;
             }
@@ -486,15 +484,11 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
                         scene.sampling.step, most_steps(plan)));
     plan.projection_mode = scene.compositing.mode != CompositingMode::over;
     plan.lit = !scene.lights.empty() && scene.shading.model != ShadingModel::none && !plan.projection_mode;
-    plan.real = scene.precision.preset == "real";
+    const PrecisionSettings precision = resolved_precision(scene);
+    plan.real = precision.preset == "real";
     plan.wants_depth = scene.output.depth;
-    if (!preset_specs(scene.precision.preset, preset_inputs(plan), plan.specs)) {
-        std::string allowed;
-        for (const std::string& name : preset_names()) allowed += (allowed.empty() ? "" : ", ") + name;
-        throw InputError(
-            fmt::format("precision.preset: no preset \"{}\"; there are {}", scene.precision.preset, allowed));
-    }
-    apply_overrides(scene, plan.specs);
+    preset_specs(precision.preset, preset_inputs(plan), plan.specs);
+    apply_overrides(precision, plan.specs);
     check_formats(plan);
     report_stages(plan);
     plan_location(plan);

@@ -163,10 +163,8 @@ std::array<W, 3> gradient_at(const Plan& plan, const Sample<W>& sample) {
                                    position.weight);
             };
             component = sample_difference(s, beside(1), beside(-1));
-        } else if (s.rule == GradientRule::analytic) {
-            component = analytic_difference(s, near, sample.position.weight, axis);
         } else {
-            component = interpolated_difference(s, near, sample.position.weight, axis);
+            component = voxel_difference(s, near, sample.position.weight, axis);
         }
         gradient[a] = to_world(s, component, axis);
     }

@@ -1,6 +1,10 @@
 #include "pipeline/render.h"
 
+#include "core/error.h"
+#include "pipeline/lanes/lane_renderer.h"
 #include "pipeline/model.h"
+
+#include <fmt/format.h>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -47,13 +51,23 @@ Rendering render(const Plan& plan, const RenderOptions& options) {
     statistics.threads = options.threads > 0
                              ? options.threads
                              : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-    statistics.path = "model";
     const std::vector<Tile> tiles = tiles_of(image.width, image.height, std::max(1, options.tile));
     std::vector<TileStatistics> per_tile(tiles.size());
     std::atomic<std::size_t> done{0};
     std::atomic<bool> stopped{false};
+    const auto setup_start = std::chrono::steady_clock::now();
+    const std::optional<std::string> obstacle =
+        options.audit ? "wires are audited" : lanes::what_needs_the_model(plan);
+    if (obstacle && options.path == Path::lanes) throw InputError(fmt::format("--path lanes: {}", *obstacle));
+    std::optional<lanes::LaneRenderer> fast;
+    if (!obstacle && options.path != Path::model) fast.emplace(plan, options);
     const ModelRenderer model(plan, options.audit);
-    statistics.why = model.why();
+    statistics.path = fast ? "lanes" : "model";
+    statistics.target = fast ? fast->target() : "";
+    statistics.why = fast ? fast->why() : model.why() + (obstacle && !plan.real ? ": " + *obstacle : "");
+    statistics.bytes = fast ? fast->bytes() : 0;
+    statistics.setup_seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - setup_start).count();
 
     const auto start = std::chrono::steady_clock::now();
     tbb::task_arena arena(statistics.threads);
@@ -65,7 +79,10 @@ Rendering render(const Plan& plan, const RenderOptions& options) {
                     if (options.cancelled && *options.cancelled) stopped = true;
                     if (stopped) return;
                     const Tile& t = tiles[i];
-                    model.render_tile(t.left, t.top, t.right, t.bottom, image, per_tile[i]);
+                    if (fast)
+                        fast->render_tile(t.left, t.top, t.right, t.bottom, image, per_tile[i]);
+                    else
+                        model.render_tile(t.left, t.top, t.right, t.bottom, image, per_tile[i]);
                     const std::size_t now = ++done;
                     if (options.progress)
                         options.progress(static_cast<double>(now) / static_cast<double>(tiles.size()));

@@ -9,9 +9,11 @@
 //   adds describe()                             tables and choices, for `squint plan`
 //   build_...(ClassificationInputs) -> M   its table builder
 // and, for every word, classify(const M&, front, back, length) -> Slab.
-#pragma once
-
+// Included once per SIMD target, so that each method's own file is.
 #include "pipeline/classification/pc.h"
+
+#ifndef SQUINT_PIPELINE_CLASSIFICATION_METHODS_H
+#define SQUINT_PIPELINE_CLASSIFICATION_METHODS_H
 
 #include <variant>
 
@@ -24,3 +26,4 @@ using ClassificationMethod = std::variant<PostClassification>;
 ClassificationMethod build_method(const ClassificationInputs& inputs);
 
 }  // namespace squint
+#endif

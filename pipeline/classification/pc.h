@@ -24,6 +24,8 @@ PostClassification build_post_classification(const ClassificationInputs& inputs)
 }  // namespace squint
 #endif
 
+#include "pipeline/classification/entries.h"
+
 #include <hwy/highway.h>
 #if defined(SQUINT_PIPELINE_CLASSIFICATION_PC_TARGET) == defined(HWY_TARGET_TOGGLE)
 #ifdef SQUINT_PIPELINE_CLASSIFICATION_PC_TARGET

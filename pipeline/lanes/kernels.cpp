@@ -1,0 +1,52 @@
+#include "pipeline/lanes/kernels.h"
+
+#include "core/error.h"
+#include "pipeline/lanes/targets.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <hwy/targets.h>
+
+namespace squint::lanes {
+namespace {
+
+// Lower bits are better targets.
+std::vector<std::int64_t> targets_here() {
+    std::vector<std::int64_t> targets;
+    const std::int64_t there = (hwy::SupportedTargets() | HWY_EMU128) & HWY_TARGETS;
+    for (int bit = 0; bit < 63; ++bit)
+        if (there >> bit & 1) targets.push_back(std::int64_t{1} << bit);
+    return targets;
+}
+
+}  // namespace
+
+std::string target_name(std::int64_t target) {
+    return hwy::TargetName(target);
+}
+
+std::vector<std::string> target_names() {
+    std::vector<std::string> names;
+    for (const std::int64_t target : targets_here()) names.push_back(target_name(target));
+    return names;
+}
+
+std::int64_t find_target(const std::string& name) {
+    const std::vector<std::int64_t> targets = targets_here();
+    if (name.empty()) return targets.front();
+    for (const std::int64_t target : targets)
+        if (target_name(target) == name) return target;
+    throw InputError(fmt::format("--target: no SIMD target \"{}\" on this machine; there are {}", name,
+                                 fmt::join(target_names(), ", ")));
+}
+
+StageKernels kernels_for(const Plan& plan, const StageWidths& widths, std::int64_t target) {
+    StageKernels kernels;
+    sampling_kernels(target, widths, kernels);
+    classification_kernel(target, plan, widths, kernels);
+    shading_kernel(target, kernels);
+    compositing_kernel(target, widths, kernels);
+    return kernels;
+}
+
+}  // namespace squint::lanes

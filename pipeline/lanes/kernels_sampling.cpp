@@ -1,0 +1,85 @@
+// Stages 1 and 2 in lanes.
+#include "pipeline/lanes/targets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "pipeline/lanes/kernels_sampling.cpp"
+#include <hwy/foreach_target.h>
+
+#include "fixedpoint/lanes.h"
+#include "pipeline/classification/entries.h"
+#include "pipeline/interpolation.h"
+#include "pipeline/lanes/kernels.h"
+#include "pipeline/location.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+namespace {
+
+using lanes::kRays;
+
+template <class L>
+void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int to, lanes::Samples& out) {
+    const LocationStage stage = plan.location;  // a copy: nothing stored can change it
+    const L full = constant<L>(std::int64_t{1} << stage.length_fraction);
+    for (int r = 0; r < kRays; r += static_cast<int>(L::count())) {
+        RayWords<L> ray;
+        for (std::size_t a = 0; a < 3; ++a) {
+            ray.first[a] = load<L>(packet.first[a].v + r);
+            ray.last[a] = load<L>(packet.last[a].v + r);
+            ray.step[a] = load<L>(packet.step[a].v + r);
+        }
+        ray.last_index = load<L>(packet.last_index.v + r);
+        const L last_length = load<L>(packet.last_length.v + r);
+        const L last_slab = load<L>(packet.slabs.v + r) - constant<L>(1);
+        for (int row = from; row < to; ++row) {
+            const int at = row * kRays + r;
+            const L k = constant<L>(out.first + row);
+            const CellPosition<L> position =
+                cell_position(stage, std::array<L, 3>{locate(stage, ray, k, 0), locate(stage, ray, k, 1),
+                                                      locate(stage, ray, k, 2)});
+            for (std::size_t a = 0; a < 3; ++a) {
+                store(position.cell[a], out.cell[a].v + at);
+                store(position.weight[a], out.weight[a].v + at);
+            }
+            store(select(k == last_slab, last_length, full), out.length.v + at);
+        }
+    }
+}
+
+template <class L>
+void interpolate_rows(const Plan& plan, int from, int to, lanes::Samples& samples) {
+    const InterpolationStage stage = plan.interpolation;
+    const InputStage input = plan.input;
+    const L low_half = constant<L>(0xffff);
+    for (int at = from * kRays; at < to * kRays; at += static_cast<int>(L::count())) {
+        Cell<L> cell;
+        for (std::size_t i = 0; i < 4; ++i) {
+            const L pair = load<L>(samples.pair[i].v + at);
+            cell.corner[2 * i] = {hn::And(pair.v, low_half.v)};
+            cell.corner[2 * i + 1] = {hn::And(hn::ShiftRight<16>(pair.v), low_half.v)};
+        }
+        const std::array<L, 3> weight{load<L>(samples.weight[0].v + at), load<L>(samples.weight[1].v + at),
+                                      load<L>(samples.weight[2].v + at)};
+        store(classification_input(input, interpolate(stage, cell, weight)), samples.input.v + at);
+    }
+}
+
+}  // namespace
+
+void sampling_kernels_of(const lanes::StageWidths& widths, lanes::StageKernels& kernels) {
+    using Narrow = Lanes<std::int32_t>;
+    using Wide = Lanes<std::int64_t>;
+    kernels.locate = widths.location == 32 ? &locate_rows<Narrow> : &locate_rows<Wide>;
+    kernels.interpolate = widths.interpolation == 32 ? &interpolate_rows<Narrow> : &interpolate_rows<Wide>;
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace squint::lanes {
+void sampling_kernels(std::int64_t target, const StageWidths& widths, StageKernels& kernels) {
+    SQUINT_CALL_TARGET(target, sampling_kernels_of, widths, kernels)
+}
+}  // namespace squint::lanes
+#endif

@@ -1,0 +1,40 @@
+// The fast path: packets of 16 rays through the stages' kernels, batch after batch.  Bit for bit what the
+// model gives.
+#pragma once
+
+#include "core/image.h"
+#include "pipeline/lanes/empty_space.h"
+#include "pipeline/lanes/kernels.h"
+#include "pipeline/model.h"
+#include "pipeline/render.h"
+
+#include <optional>
+#include <string>
+
+namespace squint::lanes {
+
+/// What keeps a plan from the lanes, in one line; none when they can run it.
+std::optional<std::string> what_needs_the_model(const Plan& plan);
+
+class LaneRenderer {
+  public:
+    /// Throws InputError for a target this machine lacks.
+    LaneRenderer(const Plan& plan, const RenderOptions& options);
+
+    /// As ModelRenderer::render_tile.
+    void render_tile(int left, int top, int right, int bottom, Image& image,
+                     TileStatistics& statistics) const;
+
+    std::string target() const { return target_name(target_); }
+    std::string why() const;
+    std::int64_t bytes() const;
+
+  private:
+    const Plan& plan_;
+    std::int64_t target_;
+    StageWidths widths_;
+    StageKernels kernels_;
+    std::optional<EmptySpace> empty_;
+};
+
+}  // namespace squint::lanes

@@ -1,0 +1,58 @@
+// What passes between the stages of the fast path: 16 rays side by side, a few steps deep, in buffers that
+// stay in the first-level cache.  A wire is an array of 32-bit words: row after row, one step a row, 16 rays
+// each.
+#pragma once
+
+#include "pipeline/location.h"
+
+#include <array>
+#include <cstdint>
+
+namespace squint::lanes {
+
+inline constexpr int kRays = 16;          // 4x4 pixels
+inline constexpr int kSteps = 8;          // slabs of each ray in a batch
+inline constexpr int kRows = kSteps + 1;  // samples: a slab may want the one behind it
+inline constexpr int kBatch = kRays * kRows;
+
+using Word = std::int32_t;
+struct alignas(64) Batch {
+    Word v[kBatch];
+};
+struct alignas(64) Row {
+    Word v[kRays];
+};
+
+/// Sixteen rays, set up; those that miss have no slabs.
+struct alignas(64) RayPacket {
+    Row first[3], last[3], step[3], last_index, slabs, last_length;
+    Row half[kMostHalves][3], view[3];
+};
+
+/// One batch: row s of ray r at s * kRays + r.  Row 0 is sample `first`.
+struct alignas(64) Samples {
+    Word first = 0;
+    Batch cell[3], weight[3];
+    Batch pair[4];          // corners by pairs along x: the lower in the low half; y fastest
+    Batch input;            // classification input
+    Batch length;           // of the slab, in steps
+    Batch color[3], alpha;  // of the slab
+};
+
+/// Samples to be lit, gathered from a batch: dense, so that transparent ones cost nothing.
+struct alignas(64) LitSamples {
+    std::array<std::int16_t, kBatch> from;  // place in the batch
+    Batch weight[2][3];                     // of the front sample, and of the back one where a slab has two
+    Batch voxel[2][64];                     // their neighbourhoods
+    Batch half[kMostHalves][3], view[3];
+    Batch color[3], alpha;
+};
+
+/// Sixteen pixels on their way.
+struct alignas(64) PixelPacket {
+    Row color[3], transparency;
+    Row active;   // 1 while a ray goes on
+    Row samples;  // slabs composited
+};
+
+}  // namespace squint::lanes

@@ -1,0 +1,55 @@
+// Which SIMD targets are compiled: AVX-512, AVX2, SSE4, NEON and plain C++ (EMU128, "scalar"), and how one is
+// called by name. Included before Highway in every file of kernels.
+#ifndef HWY_DISABLED_TARGETS
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
+#endif
+#ifndef HWY_COMPILE_ALL_ATTAINABLE
+#define HWY_COMPILE_ALL_ATTAINABLE
+#endif
+#include <hwy/detect_targets.h>
+
+// Defines F(target, ...) that calls the same function of one target's namespace; Highway's own dispatch knows
+// only the best.
+#if HWY_TARGETS & HWY_AVX3
+#define SQUINT_CASE_AVX3(F, ...) \
+    case HWY_AVX3:               \
+        return N_AVX3::F(__VA_ARGS__);
+#else
+#define SQUINT_CASE_AVX3(F, ...)
+#endif
+#if HWY_TARGETS & HWY_AVX2
+#define SQUINT_CASE_AVX2(F, ...) \
+    case HWY_AVX2:               \
+        return N_AVX2::F(__VA_ARGS__);
+#else
+#define SQUINT_CASE_AVX2(F, ...)
+#endif
+#if HWY_TARGETS & HWY_SSE4
+#define SQUINT_CASE_SSE4(F, ...) \
+    case HWY_SSE4:               \
+        return N_SSE4::F(__VA_ARGS__);
+#else
+#define SQUINT_CASE_SSE4(F, ...)
+#endif
+#if HWY_TARGETS & HWY_NEON
+#define SQUINT_CASE_NEON(F, ...) \
+    case HWY_NEON:               \
+        return N_NEON::F(__VA_ARGS__);
+#else
+#define SQUINT_CASE_NEON(F, ...)
+#endif
+#if HWY_TARGETS & HWY_EMU128
+#define SQUINT_CASE_EMU128(F, ...) \
+    case HWY_EMU128:               \
+        return N_EMU128::F(__VA_ARGS__);
+#else
+#define SQUINT_CASE_EMU128(F, ...)
+#endif
+#define SQUINT_CALL_TARGET(TARGET, F, ...) \
+    switch (TARGET) {                      \
+        SQUINT_CASE_AVX3(F, __VA_ARGS__)   \
+        SQUINT_CASE_AVX2(F, __VA_ARGS__)   \
+        SQUINT_CASE_SSE4(F, __VA_ARGS__)   \
+        SQUINT_CASE_NEON(F, __VA_ARGS__)   \
+        SQUINT_CASE_EMU128(F, __VA_ARGS__) \
+    }
