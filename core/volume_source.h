@@ -12,14 +12,14 @@ namespace squint {
 
 /// Exactly one of `file`, `procedural` is set.  Everything but these two has a default.
 struct VolumeSource {
-    std::string file = {};                    // NRRD (.nrrd, .nhdr) or raw; variables already expanded
-    std::string procedural = "phantom";  // used when `file` is empty; names in procedural.h
-    std::vector<std::int64_t> dims = {};      // raw: required; procedural: optional (one number or three)
-    std::string type = {};                    // raw: u8, i16, u16, f32
-    std::string endian = "little";       // raw: little, big
-    std::int64_t offset = 0;             // raw: bytes to skip
-    std::vector<double> spacing = {};         // raw: default 1 1 1; otherwise overrides the file's
-    std::vector<double> window = {};          // [least, greatest] in the file's units; required for f32
+    std::string file = {};                // NRRD (.nrrd, .nhdr) or raw; variables already expanded
+    std::string procedural = "phantom";   // used when `file` is empty; names in procedural.h
+    std::vector<std::int64_t> dims = {};  // raw: required; procedural: optional (one number or three)
+    std::string type = {};                // raw: u8, i16, u16, f32
+    std::string endian = "little";        // raw: little, big
+    std::int64_t offset = 0;              // raw: bytes to skip
+    std::vector<double> spacing = {};     // raw: default 1 1 1; otherwise overrides the file's
+    std::vector<double> window = {};      // [least, greatest] in the file's units; required for f32
     int bits = 0;            // float data: bits to quantise the window to (required there, 1 to 16)
     double value_scale = 1;  // value = value_scale * stored + value_offset
     double value_offset = 0;
