@@ -12,17 +12,22 @@ double unit_clamped(double x) {
     return std::clamp(x, 0.0, 1.0);
 }
 
-double power(const ShadingSettings& s, double x) {
-    if (s.power == PowerRule::parabola) return std::max(0.0, 1 - (s.exponent + 1) / 2 * (1 - x));
-    double exponent = s.exponent;
-    while (exponent > 1 && std::fmod(exponent, 2) == 0) x *= x, exponent /= 2;
-    return exponent == 1 ? x : portable::pow(x, exponent);
-}
 
 }  // namespace
 
+Power::Power(const ShadingSettings& settings)
+    : parabola_(settings.power == PowerRule::parabola), exponent_(settings.exponent) {
+    for (; !parabola_ && exponent_ > 1 && std::fmod(exponent_, 2) == 0; exponent_ /= 2) ++squarings_;
+}
+
+double Power::operator()(double x) const {
+    if (parabola_) return std::max(0.0, 1 - (exponent_ + 1) / 2 * (1 - x));
+    for (int i = 0; i < squarings_; ++i) x *= x;
+    return exponent_ == 1 ? x : portable::pow(x, exponent_);
+}
+
 RayLight::RayLight(const Scene& scene, const Camera& camera, const Vec3& ray_direction)
-    : settings_(&scene.shading), eye_(-ray_direction) {
+    : settings_(&scene.shading), power_(scene.shading), eye_(-ray_direction) {
     for (const Light& light : scene.lights) {
         const Vec3 towards = light.headlight ? -camera.view : light.direction.normalized();
         lamp_[lamps_++] = {towards, (towards + eye_).normalized(), light.color};
@@ -47,7 +52,7 @@ Reflection RayLight::operator()(const Vec3& gradient) const {
             }
             if (s.two_sided) facing = std::abs(facing);
             diffuse += lamp.color * unit_clamped(facing);
-            specular += lamp.color * power(s, unit_clamped(highlight));
+            specular += lamp.color * power_(unit_clamped(highlight));
         }
     }
     Reflection reflection;

@@ -13,6 +13,18 @@ struct Reflection {
     Vec3 diffuse{1, 1, 1}, specular{0, 0, 0};
 };
 
+/// x^p, or the parabola in its place, for x in [0, 1].
+class Power {
+public:
+    explicit Power(const ShadingSettings& settings);
+    double operator()(double x) const;
+
+private:
+    bool parabola_;
+    int squarings_ = 0;  // x^p = (x^(2^squarings))^exponent
+    double exponent_;
+};
+
 /// The lights as one ray meets them.
 class RayLight {
   public:
@@ -25,6 +37,7 @@ class RayLight {
         Vec3 towards, half, color;
     };
     const ShadingSettings* settings_;
+    Power power_;
     Vec3 eye_;  // towards it
     std::array<Lamp, kMostLights> lamp_;
     std::size_t lamps_ = 0;
