@@ -124,18 +124,17 @@ Vec3 lit_emission(const Piece& piece, const Reflect& reflect, double allowed) {
         largest, 0, 1, allowed);
 }
 
-/// Where a polynomial that is monotone on [low, high] and passes `target` there does so: Halley's method, held
-/// between bounds that close in.  A step of h leaves an error of order h^3.
+/// Where a polynomial that is monotone on [low, high] and passes `target` there does so: Halley's method,
+/// held between bounds that close in.  At a turning point its step is zero far from any root: the value
+/// decides.
 double crossing(const Cubic& p, double target, double low, double high, bool upwards) {
     double r = low;
     for (int i = 0; i < 100 && high - low > 1e-16; ++i) {
         const double value = p.at(r) - target, slope = p.slope(r), curve = p.c[2] + 3 * p.c[3] * r;
+        if (std::abs(value) <= kTouch / 10) break;
         ((value < 0) == upwards ? low : high) = r;
-        double next = r - value * slope / (slope * slope - value * curve);
-        if (!(next >= low && next <= high)) next = (low + high) / 2;
-        const double step = std::abs(next - r);
-        r = next;
-        if (step <= 1e-6) break;
+        const double next = r - value * slope / (slope * slope - value * curve);
+        r = next > low && next < high ? next : (low + high) / 2;
     }
     return r;
 }

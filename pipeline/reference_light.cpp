@@ -12,7 +12,6 @@ double unit_clamped(double x) {
     return std::clamp(x, 0.0, 1.0);
 }
 
-
 }  // namespace
 
 Power::Power(const ShadingSettings& settings)

@@ -15,11 +15,11 @@ struct Reflection {
 
 /// x^p, or the parabola in its place, for x in [0, 1].
 class Power {
-public:
+  public:
     explicit Power(const ShadingSettings& settings);
     double operator()(double x) const;
 
-private:
+  private:
     bool parabola_;
     int squarings_ = 0;  // x^p = (x^(2^squarings))^exponent
     double exponent_;

@@ -96,6 +96,28 @@ TEST(Reference, ACellsDiagonalIsACubic) {
     expect_pixel(reference_pixel(plan, 0, 0), color, alpha);
 }
 
+TEST(Reference, ATurningPointInsideACellIsPassedOnBothSides) {
+    // s = 252 r (1 - r), at most 63, along a face's diagonal of length sqrt 2; nothing up to entry 31, depth
+    // 1 a unit from 32 on, linear between.  s = 31 at r = (1 -+ a) / 2, s = 32 at (1 -+ b) / 2; the ramp's
+    // integral is that of 252 r (1 - r) - 31.
+    const auto volume =
+        volume_of({2, 2, 2}, 8, Vec3(1), [](const Index3& p) { return p.x * (1 - p.y) * 252; });
+    Scene scene = plain_scene();
+    look(scene, *volume, Vec3(1, 1, 0));
+    Plan plan = make_plan(scene, volume);
+    set_entries(plan, [](int i) { return matter(i < 32 ? 0 : 1, 1); });
+    const double a = std::sqrt(1 - 31 / 63.0), b = std::sqrt(1 - 32 / 63.0);
+    const auto ramp = [](double r) { return 126 * r * r - 84 * r * r * r - 31 * r; };
+    const double depth = std::sqrt(2) * (b + 2 * (ramp((1 - b) / 2) - ramp((1 - a) / 2)));
+    expect_pixel(reference_pixel(plan, 0, 0), 1 - std::exp(-depth), 1 - std::exp(-depth));
+
+    // An opaque entry at the very top, and one just above it.
+    set_entries(plan, [](int i) { return i == 63 ? surface(0, 1) : matter(0, 1); });
+    expect_pixel(reference_pixel(plan, 0, 0), 1, 1);
+    set_entries(plan, [](int i) { return i == 64 ? surface(0, 1) : matter(0, 1); });
+    expect_pixel(reference_pixel(plan, 0, 0), 0, 0);
+}
+
 TEST(Reference, ABallSeenThroughVoxelCentresIsTheSumOfItsVoxels) {
     // s = max(0, 100 - |p|^2) around the middle voxel: along a row of voxels the field is linear between
     // them.
