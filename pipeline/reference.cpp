@@ -37,12 +37,11 @@ constexpr std::array<double, 7> kKronrod{
 constexpr std::array<double, 7> kGauss{0, 5.0 / 9, 0, 8.0 / 9, 0, 5.0 / 9, 0};
 
 /// exp(-x), x >= 0.  Most pieces are thin: eight terms of the series are below a rounding up to 1/32.
-double attenuation(double x) {
+inline double attenuation(double x) {
     if (x > 0.03125) return portable::exp(-x);
-    constexpr double kPart[] = {1, 1.0 / 2, 1.0 / 3, 1.0 / 4, 1.0 / 5, 1.0 / 6, 1.0 / 7, 1.0 / 8};
-    double sum = 1;
-    for (int k = 7; k >= 0; --k) sum = 1 - sum * (x * kPart[k]);
-    return sum;
+    const double y = x * x;
+    return (1 - x) + y * ((1.0 / 2 - x * (1.0 / 6)) +
+                          y * ((1.0 / 24 - x * (1.0 / 120)) + y * (1.0 / 720 - x * (1.0 / 5040))));
 }
 
 /// A piece of a ray between two knots, q from 0 to 1.

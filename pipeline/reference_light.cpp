@@ -9,7 +9,7 @@ namespace squint::reference {
 namespace {
 
 double unit_clamped(double x) {
-    return std::clamp(x, 0.0, 1.0);
+    return std::min(std::max(x, 0.0), 1.0);
 }
 
 }  // namespace
@@ -19,16 +19,11 @@ Power::Power(const ShadingSettings& settings)
     for (; !parabola_ && exponent_ > 1 && std::fmod(exponent_, 2) == 0; exponent_ /= 2) ++squarings_;
 }
 
-double Power::operator()(double x) const {
-    if (parabola_) return std::max(0.0, 1 - (exponent_ + 1) / 2 * (1 - x));
-    for (int i = 0; i < squarings_; ++i) x *= x;
-    return exponent_ == 1 ? x : portable::pow(x, exponent_);
-}
-
 RayLight::RayLight(const Scene& scene, const Camera& camera, const Vec3& ray_direction)
     : settings_(&scene.shading), power_(scene.shading), eye_(-ray_direction) {
     for (const Light& light : scene.lights) {
         const Vec3 towards = light.headlight ? -camera.view : light.direction.normalized();
+        white_ = white_ && light.color == Vec3(1);
         lamp_[lamps_++] = {towards, (towards + eye_).normalized(), light.color};
     }
 }
@@ -54,12 +49,11 @@ Reflection RayLight::operator()(const Vec3& gradient) const {
             specular += lamp.color * power_(unit_clamped(highlight));
         }
     }
-    Reflection reflection;
-    for (int c = 0; c < 3; ++c) {
-        reflection.diffuse[c] = unit_clamped(s.ka + s.kd * unit_clamped(diffuse[c]));
-        reflection.specular[c] = s.ks * unit_clamped(specular[c]);
-    }
-    return reflection;
+    const auto lit = [&](double sum) { return unit_clamped(s.ka + s.kd * unit_clamped(sum)); };
+    const auto shine = [&](double sum) { return s.ks * unit_clamped(sum); };
+    if (white_) return {Vec3(lit(diffuse.x)), Vec3(shine(specular.x))};
+    return {Vec3(lit(diffuse.x), lit(diffuse.y), lit(diffuse.z)),
+            Vec3(shine(specular.x), shine(specular.y), shine(specular.z))};
 }
 
 }  // namespace squint::reference

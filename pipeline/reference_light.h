@@ -2,8 +2,10 @@
 #pragma once
 
 #include "core/camera.h"
+#include "core/portable_math.h"
 #include "pipeline/scene.h"
 
+#include <algorithm>
 #include <array>
 
 namespace squint::reference {
@@ -17,7 +19,11 @@ struct Reflection {
 class Power {
   public:
     explicit Power(const ShadingSettings& settings);
-    double operator()(double x) const;
+    double operator()(double x) const {
+        if (parabola_) return std::max(0.0, 1 - (exponent_ + 1) / 2 * (1 - x));
+        for (int i = 0; i < squarings_; ++i) x *= x;
+        return exponent_ == 1 ? x : portable::pow(x, exponent_);
+    }
 
   private:
     bool parabola_;
@@ -41,6 +47,7 @@ class RayLight {
     Vec3 eye_;  // towards it
     std::array<Lamp, kMostLights> lamp_;
     std::size_t lamps_ = 0;
+    bool white_ = true;  // every lamp is
 };
 
 }  // namespace squint::reference

@@ -61,8 +61,8 @@ TEST(ReferenceConvergence, SecondOrderWhereRaysStartAndEndInAir) {
 }
 
 TEST(ReferenceConvergence, SecondOrderWhereLightFalls) {
-    // A lit slab takes its front's normal: as smooth along the ray as its colour.  Ambient and diffuse light
-    // on both sides bend where N.L changes sign, without a jump.
+    // A lit slab takes its front's normal, which runs as smoothly as its colour; where N.L changes sign the
+    // light bends without a jump.
     Scene scene = ball_scene();
     scene.lights = {{.direction = Vec3(1, -1, 1)}};
     scene.shading.exponent = 4;
