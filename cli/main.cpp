@@ -1,25 +1,96 @@
-// The squint program: one verb a file.
+// The squint program: parses the command line, runs one verb, turns what is thrown into one line and an exit
+// code.
+//
+//   0 done   1 a comparison failed   2 usage or input   70 internal error   130 interrupted
+#include "cli/arguments.h"
+#include "cli/common.h"
+#include "core/atomic_file.h"
 #include "core/error.h"
-#include "pipeline/render.h"
 
+#include <unistd.h>
+
+#include <csignal>
 #include <cstdio>
-#include <cstring>
+#include <ctime>
+#include <exception>
+#include <new>
+
+namespace squint::cli {
+
+std::atomic<bool> interrupted{false};
+
+namespace {
+
+std::atomic<int> interruptible{0};
+static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
+
+// Another thread may be about to create its temporary: it does so long before the second look.
+void remove_temporaries_twice() noexcept {
+    remove_temporaries();
+    const timespec pause{0, 20'000'000};
+    nanosleep(&pause, nullptr);
+    remove_temporaries();
+}
+
+void leave_at_once() {
+    remove_temporaries_twice();
+    constexpr char message[] = "squint: interrupted\n";
+    [[maybe_unused]] const auto written = write(STDERR_FILENO, message, sizeof message - 1);
+    _exit(kInterrupted);
+}
+
+void on_interrupt(int) {
+    if (interruptible > 0 && !interrupted)
+        interrupted = true;
+    else
+        leave_at_once();
+}
+
+// Ends as the signal asks, but leaves nothing behind.
+void on_end(int signal) {
+    remove_temporaries_twice();
+    std::signal(signal, SIG_DFL);
+    std::raise(signal);
+}
+
+// What whoever started us ignores (nohup, a job in the background) stays ignored.
+void handle(int signal, void (*handler)(int)) {
+    if (std::signal(signal, handler) == SIG_IGN) std::signal(signal, SIG_IGN);
+}
+
+int report(int code, const char* kind, const char* what) {
+    std::fprintf(stderr, "squint: %s%s\n", kind, what);
+    return code;
+}
+
+}  // namespace
+
+Interruptible::Interruptible() {
+    ++interruptible;
+}
+Interruptible::~Interruptible() {
+    --interruptible;
+}
+
+}  // namespace squint::cli
 
 int main(int argc, char** argv) {
     using namespace squint;
+    using namespace squint::cli;
+    handle(SIGINT, on_interrupt);
+    handle(SIGTERM, on_interrupt);
+    handle(SIGHUP, on_end);
+    handle(SIGPIPE, on_end);
     try {
-        const std::vector<std::string> overrides(argv + std::min(argc, 3), argv + argc);
-        const Scene scene = argc > 1 && std::strcmp(argv[1], "-") != 0 ? read_scene(argv[1], overrides) : scene_with(built_in_scene(), overrides);
-        const auto volume = std::make_shared<const Volume>(load_volume(volume_source(scene)));
-        const Plan plan = make_plan(scene, volume);
-        RenderOptions options; if (std::getenv("MODEL")) options.path = Path::model; if (std::getenv("NOSKIP")) options.skip = false; if (const char* t = std::getenv("THREADS")) options.threads = atoi(t); if (const char* t = std::getenv("TARGET")) options.target = t;
-        const Rendering r = render(plan, options);
-        std::fprintf(stderr, "%s %.3f s, %ld samples\n", r.statistics.why.c_str(), r.statistics.seconds, long(r.statistics.samples));
-        const double background[3] = {0, 0, 0};
-        if (argc > 2) write_exr(r.image, argv[2], {}), write_preview_png(r.image, std::string(argv[2]) + ".png", background);
-    } catch (const InputError& e) {
-        std::fprintf(stderr, "squint: %s\n", e.what());
-        return 2;
+        return std::visit([](const auto& arguments) { return run(arguments); }, parse(argc, argv));
+    } catch (const InputError& error) {
+        return report(kUsage, "", error.what());
+    } catch (const Cancelled&) {
+        return report(kInterrupted, "", "interrupted");
+    } catch (const std::bad_alloc&) {
+        return report(kUsage, "",
+                      "out of memory: this machine has too little for this scene; see --max-memory");
+    } catch (const std::exception& error) {
+        return report(kInternal, "internal error: ", error.what());
     }
-    return 0;
 }

@@ -1,0 +1,351 @@
+// The command line: the only file that includes CLI11 (18 s to compile).
+#include "cli/arguments.h"
+
+#include "core/error.h"
+#include "pipeline/record.h"
+#include "pipeline/scene.h"
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <charconv>
+#include <map>
+
+namespace squint::cli {
+namespace {
+
+template <class Number>
+Number number_of(const std::string& text, const char* flag, const char* allowed) {
+    Number value{};
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc{} || end != text.data() + text.size())
+        throw InputError(fmt::format("{}: found \"{}\"; allowed: {}", flag, text, allowed));
+    return value;
+}
+
+/// "512x256" -> two numbers; the scene checks their range.
+std::pair<int, int> pair_of(const std::string& text, char separator, const char* flag, const char* allowed) {
+    const std::size_t at = text.find(separator);
+    if (at == std::string::npos)
+        throw InputError(fmt::format("{}: found \"{}\"; allowed: {}", flag, text, allowed));
+    return {number_of<int>(text.substr(0, at), flag, allowed),
+            number_of<int>(text.substr(at + 1), flag, allowed)};
+}
+
+/// "800M" -> bytes.
+std::int64_t size_of(const std::string& text) {
+    constexpr const char* kAllowed = "a number above 0 with K, M, G or T, as in 500M";
+    std::string digits = text;
+    if (!digits.empty() && digits.back() == 'B') digits.pop_back();
+    int shift = 0;
+    if (!digits.empty())
+        if (const auto unit = std::string_view("KMGT").find(digits.back()); unit != std::string_view::npos)
+            shift = 10 * (static_cast<int>(unit) + 1), digits.pop_back();
+    const auto value = number_of<std::int64_t>(digits, "--max-memory", kAllowed);
+    if (value < 1 || value > (std::int64_t{1} << (62 - shift)))
+        throw InputError(fmt::format("--max-memory: found \"{}\"; allowed: {}", text, kAllowed));
+    return value << shift;
+}
+
+void add_json_flag(CLI::App& verb, bool& json) {
+    verb.add_flag("--json", json, "Print JSON");
+}
+
+void add_set(CLI::App& verb, std::vector<std::string>& overrides, const char* help) {
+    verb.add_option_function<std::string>(
+            "--set", [&](const std::string& text) { overrides.push_back(text); }, help)
+        ->trigger_on_parse()
+        ->type_name("KEY=VALUE");
+}
+
+void add_scene(CLI::App& verb, SceneArguments& scene) {
+    verb.add_option("scene", scene.file, "Scene file (TOML); the built-in scene when left out")
+        ->type_name("SCENE.toml");
+    add_set(verb, scene.overrides, "Set any key of the scene; may be repeated, the last wins");
+    verb.add_option_function<std::string>(
+            "--size",
+            [&](const std::string& text) {
+                const auto [width, height] = pair_of(text, 'x', "--size", "WIDTHxHEIGHT, as in 800x600");
+                scene.overrides.push_back(fmt::format("image.width={}", width));
+                scene.overrides.push_back(fmt::format("image.height={}", height));
+            },
+            "Pixels; the same as setting image.width and image.height")
+        ->trigger_on_parse()
+        ->type_name("WxH");
+}
+
+void add_render(CLI::App& app, RenderArguments& a) {
+    CLI::App& verb = *app.add_subcommand("render", "Render a scene to EXR");
+    add_scene(verb, a.scene);
+    verb.add_option(
+            "-o,--output", a.output,
+            "EXR to write; when left out and nothing else is asked for, the scene's name with .exr; a "
+            "turntable writes OUT.0000.exr and so on")
+        ->type_name("OUT.exr");
+    verb.add_option("--preview", a.preview, "PNG to write: over the background, encoded as sRGB")
+        ->type_name("OUT.png");
+    verb.add_option(
+            "--json", a.json,
+            "Write a record of the picture (schema squint.render/1): time, samples, path, memory, hash")
+        ->type_name("FILE|-");
+    verb.add_flag("--error", a.error,
+                  "Measure the error against the same scene in double, and each stage's share");
+    verb.add_flag("--reference", a.reference, "Measure the error against the exact integral along each ray");
+    verb.add_flag("--audit", a.options.audit,
+                  "Count what every wire carried: least, greatest, inexact, saturated, wrapped");
+    verb.add_option("--threads", a.options.threads, "Threads; default: one a processor")
+        ->check(CLI::Range(1, 4096))
+        ->type_name("N");
+    verb.add_option("--tile", a.options.tile, "Pixels on a side of a thread's piece of work")
+        ->check(CLI::Range(1, 65536))
+        ->type_name("N")
+        ->capture_default_str();
+    static const std::map<std::string, Path> paths{
+        {"auto", Path::automatic}, {"model", Path::model}, {"lanes", Path::lanes}};
+    verb.add_option_function<std::string>(
+            "--path", [&](const std::string& name) { a.options.path = paths.at(name); },
+            "auto, model (one sample at a time) or lanes (SIMD): the same bits")
+        ->check(CLI::IsMember({"auto", "model", "lanes"}))
+        ->type_name("NAME");
+    verb.add_option("--target", a.options.target, "SIMD target of the lanes; `squint doctor` lists them")
+        ->type_name("NAME");
+    static const std::map<std::string, LayoutRule> layouts{
+        {"auto", LayoutRule::automatic}, {"linear", LayoutRule::linear}, {"cells", LayoutRule::cells}};
+    verb.add_option_function<std::string>(
+            "--layout", [&](const std::string& name) { a.options.layout = layouts.at(name); },
+            "How voxels lie in memory for the lanes: auto, linear or cells")
+        ->check(CLI::IsMember({"auto", "linear", "cells"}))
+        ->type_name("NAME");
+    verb.add_flag_function(
+        "--no-skip", [&](std::int64_t) { a.options.skip = false; }, "Visit empty space too");
+    verb.add_option_function<std::string>(
+            "--max-memory", [&](const std::string& text) { a.max_memory = size_of(text); },
+            "Refuse a scene that needs more, as in 2G")
+        ->type_name("SIZE");
+    verb.add_flag("-q,--quiet", a.quiet, "No progress, no summary");
+    verb.add_flag("--scene-reference", a.scene_reference,
+                  "Print docs/scene.md, every key of a scene, and stop");
+    verb.footer(
+        "Examples:\n"
+        "  squint render -o head.exr --preview head.png --error\n"
+        "  squint render head.toml --set precision.preset=squeeze --set sampling.step=0.5 -o squeeze.exr\n"
+        "  squint render head.toml --set 'precision.transparency=u1.8 trn' --audit --json -");
+}
+
+void add_plan(CLI::App& app, PlanArguments& a) {
+    CLI::App& verb = *app.add_subcommand(
+        "plan",
+        "Say what a scene exercises: stages, wires, formats, words, tables, and what is left out and why");
+    add_scene(verb, a.scene);
+    add_json_flag(verb, a.json);
+    verb.footer("Example:\n  squint plan head.toml --set precision.preset=squeeze");
+}
+
+void add_pixel(CLI::App& app, PixelArguments& a) {
+    CLI::App& verb = *app.add_subcommand("pixel", "Show every wire of one pixel's ray, sample by sample");
+    verb.add_option("scene_x_y", a.words,
+                    "Scene file (built-in when left out), column from the left, row from the top")
+        ->type_name("[SCENE.toml] X Y")
+        ->required();
+    add_set(verb, a.scene.overrides, "Set any key of the scene; may be repeated, the last wins");
+    verb.add_option_function<std::string>(
+            "--size",
+            [&](const std::string& text) {
+                const auto [width, height] = pair_of(text, 'x', "--size", "WIDTHxHEIGHT, as in 800x600");
+                a.scene.overrides.push_back(fmt::format("image.width={}", width));
+                a.scene.overrides.push_back(fmt::format("image.height={}", height));
+            },
+            "Pixels of the whole picture")
+        ->trigger_on_parse()
+        ->type_name("WxH");
+    verb.add_option_function<std::string>(
+            "--samples",
+            [&](const std::string& text) {
+                constexpr const char* kAllowed = "FIRST:LAST, as in 10:12";
+                a.samples = pair_of(text, ':', "--samples", kAllowed);
+                if (a.samples.first < 0 || a.samples.second < a.samples.first)
+                    throw InputError(fmt::format("--samples: found \"{}\"; allowed: {}", text, kAllowed));
+            },
+            "Only these samples, counted from 0, both ends included")
+        ->type_name("A:B");
+    add_json_flag(verb, a.json);
+    verb.callback([&a] {
+        const std::vector<std::string>& words = a.words;
+        if (words.size() < 2 || words.size() > 3)
+            throw InputError(fmt::format(
+                "pixel: {} words given; allowed: [SCENE.toml] X Y, as in squint pixel head.toml 256 100",
+                words.size()));
+        if (words.size() == 3) a.scene.file = words[0];
+        a.column = number_of<int>(words[words.size() - 2], "pixel: X", "a column, 0 at the left");
+        a.row = number_of<int>(words[words.size() - 1], "pixel: Y", "a row, 0 at the top");
+    });
+    verb.footer("Example:\n  squint pixel head.toml 256 100 --samples 10:12");
+}
+
+void add_number(CLI::App& app, NumberArguments& a) {
+    CLI::App& verb = *app.add_subcommand("number", "Calculate in fixed-point formats");
+    verb.add_option("words", a.words,
+                    "RESULT NUMBER, or RESULT OPERATION OPERAND...; standard input when left out")
+        ->type_name("");
+    add_json_flag(verb, a.json);
+    verb.footer(
+        "RESULT is a format with a rounding (trn, trn_zero, rnd, rnd_conv) and an overflow rule (sat, wrap), "
+        "as in\n"
+        "u1.15 trn sat; what is left out is rnd_conv and sat.  Signed formats begin with s.\n"
+        "OPERATION is add or +, sub or -, mul or *, madd (a b c: a b + c), lerp (a b w: a + w (b - a)).\n"
+        "An OPERAND is a format and a number; the format may be left out where it is the one before.  A "
+        "number is\n"
+        "decimal (0.7, -1e-3), a raw integer (#22938) or raw hexadecimal (0x599a).  A decimal is first "
+        "rounded to its\n"
+        "operand's format.  The operation is exact, and its result is quantised once.\n"
+        "\n"
+        "Examples:\n"
+        "  squint number u1.15 0.7\n"
+        "  squint number u1.15 trn mul u1.15 0.7 0.7\n"
+        "  squint number s4.4 rnd wrap add u4.4 15.5 u1.8 0.75\n"
+        "  squint number u12.4 lerp u12.0 100 200 u1.12 0.25\n"
+        "  squint number u1.8 madd '#128' '#255' '#1'\n"
+        "  printf 'u1.15 0.7\\nu0.8 mul 0.5 0.5\\n' | squint number");
+}
+
+void add_compare(CLI::App& app, CompareArguments& a) {
+    CLI::App& verb = *app.add_subcommand("compare", "Compare two pictures; exit code 1 when a bound fails");
+    verb.add_option("a", a.a, "Picture")->required()->type_name("A");
+    verb.add_option("b", a.b, "Picture to compare with")->required()->type_name("B");
+    verb.add_option("--diff", a.diff, "Write A - B: an EXR with its signs, or a PNG of its size")
+        ->type_name("OUT");
+    verb.add_option("--gain", a.gain, "Multiply the difference in --diff")->type_name("NUMBER");
+    verb.add_option_function<std::string>(
+            "--transfer", [&](const std::string& name) { a.srgb = name == "srgb"; },
+            "linear, or srgb: encode R, G and B first")
+        ->check(CLI::IsMember({"linear", "srgb"}))
+        ->type_name("NAME");
+    verb.add_option("--fail-above", a.fail_above, "Fail when any error is larger, in 1/255 of full scale")
+        ->check(CLI::NonNegativeNumber)
+        ->type_name("LSB8");
+    verb.add_option("--min-psnr", a.min_psnr, "Fail when the PSNR over the foreground is lower")
+        ->type_name("DB");
+    add_json_flag(verb, a.json);
+    verb.footer(
+        "Different sizes or channels and values that are not finite fail, always.\n\n"
+        "Example:\n  squint compare fixed.exr real.exr --min-psnr 60 --diff diff.exr");
+}
+
+void add_info(CLI::App& app, InfoArguments& a) {
+    CLI::App& verb = *app.add_subcommand("info", "Describe a volume: size, type, spacing, range, histogram");
+    verb.add_option("volume", a.volume, "NRRD or raw file, or a procedural volume by name")
+        ->type_name("VOLUME");
+    add_set(verb, a.overrides, "Set a volume.* key: what a raw file does not say");
+    add_json_flag(verb, a.json);
+    verb.footer(
+        "Examples:\n"
+        "  squint info head.nrrd\n"
+        "  squint info head.raw --set volume.dims=[256,256,113] --set volume.type=u16\n"
+        "  squint info phantom");
+}
+
+void add_volume(CLI::App& app, VolumeArguments& a) {
+    CLI::App& verb = *app.add_subcommand("volume", "Write a procedural or raw volume as NRRD");
+    verb.add_option("volume", a.volume, "A procedural volume by name, or a NRRD or raw file")
+        ->required()
+        ->type_name("NAME|FILE");
+    verb.add_option("-o,--output", a.output, "NRRD to write")->required()->type_name("OUT.nrrd");
+    add_set(verb, a.overrides, "Set a volume.* key");
+    verb.add_option_function<std::string>(
+            "--dims",
+            [&](const std::string& text) {
+                std::string list = text;
+                std::replace(list.begin(), list.end(), 'x', ',');
+                a.overrides.push_back("volume.dims=[" + list + "]");
+            },
+            "Voxels, as in 64 or 64x64x32")
+        ->trigger_on_parse()
+        ->type_name("N|XxYxZ");
+    verb.add_option_function<std::string>(
+            "--bits", [&](const std::string& text) { a.overrides.push_back("volume.bits=" + text); },
+            "Bits of a procedural or float volume")
+        ->trigger_on_parse()
+        ->type_name("N");
+    verb.footer("Example:\n  squint volume marschner_lobb --dims 64 --bits 8 -o ml.nrrd");
+}
+
+void add_doctor(CLI::App& app, DoctorArguments& a) {
+    CLI::App& verb = *app.add_subcommand(
+        "doctor", "Check this installation: libraries, SIMD targets, threads, a test picture");
+    add_json_flag(verb, a.json);
+    verb.footer("Example:\n  squint doctor");
+}
+
+/// CLI11's messages on one line, with where to look.
+std::string one_line(std::string message, const std::string& verb) {
+    std::replace(message.begin(), message.end(), '\n', ' ');
+    while (!message.empty() && (message.back() == ' ' || message.back() == '.')) message.pop_back();
+    return fmt::format("{}{}; see squint{}{} --help", verb.empty() ? "" : verb + ": ", message,
+                       verb.empty() ? "" : " ", verb);
+}
+
+}  // namespace
+
+Arguments parse(int argc, char** argv) {
+    CLI::App app("Fixed-point volume ray casting with every bit of every stage a setting.", "squint");
+    app.set_version_flag("--version", "squint " + version());
+    app.require_subcommand(0, 1);
+    RenderArguments render;
+    PlanArguments plan;
+    PixelArguments pixel;
+    NumberArguments number;
+    CompareArguments compare;
+    InfoArguments info;
+    VolumeArguments volume;
+    DoctorArguments doctor;
+    add_render(app, render);
+    add_plan(app, plan);
+    add_pixel(app, pixel);
+    add_number(app, number);
+    add_compare(app, compare);
+    add_info(app, info);
+    add_volume(app, volume);
+    add_doctor(app, doctor);
+    std::string about;
+    CLI::App& help = *app.add_subcommand("help", "Show this help, or a verb's");
+    help.add_option("verb", about, "A verb")->type_name("VERB");
+    help.footer("Example:\n  squint help render");
+    app.footer(
+        "`squint VERB --help` has every flag and an example; `squint render --scene-reference` every key of "
+        "a scene.\n"
+        "Exit codes: 0 done, 1 a comparison failed, 2 usage or input, 70 internal error, 130 interrupted.\n\n"
+        "Example:\n  squint render -o out.exr --preview out.png");
+
+    const auto chosen = [&]() -> std::string {
+        const auto verbs = app.get_subcommands();
+        return verbs.empty() ? "" : verbs[0]->get_name();
+    };
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::CallForHelp&) {
+        return Text{chosen().empty() ? app.help() : app.get_subcommands()[0]->help()};
+    } catch (const CLI::CallForVersion&) {
+        return Text{"squint " + version() + "\n"};
+    } catch (const CLI::ParseError& error) {
+        throw InputError(one_line(error.what(), chosen()));
+    }
+    const std::string verb = chosen();
+    if (verb == "render") return render;
+    if (verb == "plan") return plan;
+    if (verb == "pixel") return pixel;
+    if (verb == "number") return number;
+    if (verb == "compare") return compare;
+    if (verb == "info") return info;
+    if (verb == "volume") return volume;
+    if (verb == "doctor") return doctor;
+    if (verb == "help" && !about.empty()) {
+        const auto of = app.get_subcommands([&](const CLI::App* each) { return each->get_name() == about; });
+        if (of.empty()) throw InputError(fmt::format("help: no verb \"{}\"; squint help lists them", about));
+        return Text{of[0]->help()};
+    }
+    if (verb == "help") return Text{app.help()};
+    throw InputError("no verb given; squint help lists them");
+}
+
+}  // namespace squint::cli

@@ -1,0 +1,83 @@
+// What was asked for on the command line: one plain structure a verb.
+#pragma once
+
+#include "pipeline/render.h"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace squint::cli {
+
+/// A scene: a file or the built-in one, and settings in the order given.
+struct SceneArguments {
+    std::string file;
+    std::vector<std::string> overrides;
+};
+
+struct RenderArguments {
+    SceneArguments scene;
+    std::string output, preview, json;  // json: a file, or - for standard output
+    RenderOptions options;
+    std::int64_t max_memory = 0;  // bytes; 0: no limit
+    bool reference = false, error = false, quiet = false, scene_reference = false;
+};
+struct PlanArguments {
+    SceneArguments scene;
+    bool json = false;
+};
+struct PixelArguments {
+    std::vector<std::string> words;  // [SCENE.toml] X Y, as given: taken apart below
+    SceneArguments scene;
+    int column = 0, row = 0;
+    std::pair<int, int> samples{0, -1};  // first and last; last -1: all
+    bool json = false;
+};
+struct NumberArguments {
+    std::vector<std::string> words;  // empty: operations come from standard input
+    bool json = false;
+};
+struct CompareArguments {
+    std::string a, b, diff;
+    double gain = 1;
+    bool srgb = false, json = false;
+    std::optional<double> fail_above;  // LSB8
+    std::optional<double> min_psnr;    // dB
+};
+struct InfoArguments {
+    std::string volume;  // a procedural name or a file
+    std::vector<std::string> overrides;
+    bool json = false;
+};
+struct VolumeArguments {
+    std::string volume, output;
+    std::vector<std::string> overrides;
+};
+struct DoctorArguments {
+    bool json = false;
+};
+struct Text {  // help, version: printed, done
+    std::string text;
+};
+
+using Arguments = std::variant<RenderArguments, PlanArguments, PixelArguments, NumberArguments,
+                               CompareArguments, InfoArguments, VolumeArguments, DoctorArguments, Text>;
+
+/// Throws InputError: what was found and where help is.
+Arguments parse(int argc, char** argv);
+
+// One a verb.  Each returns an exit code and throws InputError.
+int run(const RenderArguments& arguments);
+int run(const PlanArguments& arguments);
+int run(const PixelArguments& arguments);
+int run(const NumberArguments& arguments);
+int run(const CompareArguments& arguments);
+int run(const InfoArguments& arguments);
+int run(const VolumeArguments& arguments);
+int run(const DoctorArguments& arguments);
+int run(const Text& text);
+
+}  // namespace squint::cli

@@ -1,0 +1,103 @@
+#include "cli/common.h"
+
+#include "core/error.h"
+#include "core/procedural.h"
+#include "core/volume_source.h"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+
+namespace squint::cli {
+
+void print(std::string_view text) {
+    if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
+        throw InputError(fmt::format("standard output: cannot write: {}", std::strerror(errno)));
+}
+
+void print_json(const nlohmann::ordered_json& json) {
+    print(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+}
+
+Scene read(const SceneArguments& arguments) {
+    Scene scene = arguments.file.empty() ? scene_with(built_in_scene(), arguments.overrides)
+                                         : read_scene(arguments.file, arguments.overrides);
+    scene.precision = resolved_precision(scene);
+    return scene;
+}
+
+Scene scene_of_volume(const std::string& name_or_file, const std::vector<std::string>& overrides) {
+    Scene any = built_in_scene();  // a scene has more than a volume: what else it says does not count here
+    any.volume = {};
+    Scene scene = scene_with(any, overrides);
+    if (name_or_file.empty()) return scene;
+    if (find_procedural(name_or_file))
+        scene.volume.procedural = name_or_file, scene.volume.file.clear();
+    else
+        scene.volume.file = name_or_file, scene.volume.procedural.clear();
+    return scene;
+}
+
+std::shared_ptr<const Volume> load(const Scene& scene, std::vector<std::string>& notes,
+                                   std::int64_t max_bytes) {
+    LoadLimits limits;
+    if (max_bytes > 0) limits.max_bytes = std::min(limits.max_bytes, max_bytes);
+    return std::make_shared<const Volume>(load_volume(volume_source(scene), limits, &notes));
+}
+
+Plan plan_of(const SceneArguments& arguments) {
+    const Scene scene = read(arguments);
+    std::vector<std::string> notes;
+    const auto volume = load(scene, notes);
+    Plan plan = make_plan(scene, volume);
+    plan.notes.insert(plan.notes.begin(), notes.begin(), notes.end());
+    return plan;
+}
+
+std::string text_of_bytes(std::int64_t bytes) {
+    const char* units[] = {"bytes", "KiB", "MiB", "GiB", "TiB"};
+    auto value = static_cast<double>(bytes);
+    int unit = 0;
+    while (value >= 1024 && unit < 4) value /= 1024, ++unit;
+    return unit == 0 ? fmt::format("{} {}", bytes, units[0]) : fmt::format("{:.1f} {}", value, units[unit]);
+}
+
+std::string text_of_count(std::int64_t count) {
+    if (count < 10000) return std::to_string(count);
+    const char* units[] = {"", " k", " M", " G", " T"};
+    auto value = static_cast<double>(count);
+    int unit = 0;
+    while (value >= 1000 && unit < 4) value /= 1000, ++unit;
+    return fmt::format("{:.1f}{}", value, units[unit]);
+}
+
+std::string table_text(const std::vector<std::vector<std::string>>& rows, std::string_view indent) {
+    std::vector<std::size_t> width;
+    std::vector<bool> numeric;
+    for (std::size_t r = 0; r < rows.size(); ++r)
+        for (std::size_t c = 0; c < rows[r].size(); ++c) {
+            if (width.size() <= c) width.push_back(0), numeric.push_back(true);
+            const std::string& cell = rows[r][c];
+            width[c] = std::max(width[c], cell.size());
+            if (r > 0 && !cell.empty() && cell != "-" && cell.find_first_of("0123456789") > 1)
+                numeric[c] = false;
+        }
+    std::string text;
+    for (const auto& row : rows) {
+        std::string line(indent);
+        for (std::size_t c = 0; c < row.size(); ++c) {
+            if (c > 0) line += "  ";
+            line += numeric[c] ? fmt::format("{:>{}}", row[c], width[c])
+                               : fmt::format("{:<{}}", row[c], width[c]);
+        }
+        line.erase(line.find_last_not_of(' ') + 1);
+        text += line + "\n";
+    }
+    return text;
+}
+
+}  // namespace squint::cli

@@ -1,0 +1,113 @@
+// squint compare: differences between two pictures, and bounds they must keep.
+#include "core/compare.h"
+
+#include "cli/common.h"
+#include "core/error.h"
+#include "pipeline/record.h"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <cmath>
+#include <filesystem>
+
+namespace squint::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string psnr_text(const Difference& d, bool words) {
+    return d.identical ? "identical" : words ? "-" : fmt::format("{:.2f}", d.psnr.value_or(0));
+}
+
+std::string figures_text(const Comparison& comparison, const Image& image) {
+    std::vector<std::vector<std::string>> rows{{"channel", "PSNR all", "PSNR foreground", "RMSE", "bias",
+                                                "max error", "at x", "y", "SSIM", "foreground pixels"}};
+    for (std::size_t i = 0; i < comparison.all.size(); ++i) {
+        const Difference &all = comparison.all[i], &foreground = comparison.foreground[i];
+        const Channel* channel = image.find(all.channel);
+        const bool words = channel && channel->is_words();
+        const double unit = words ? 1 : 255;
+        rows.push_back({all.channel, psnr_text(all, words), psnr_text(foreground, words),
+                        fmt::format("{:.4g}", unit * all.rmse), fmt::format("{:+.4g}", unit * all.bias),
+                        fmt::format("{:.4g}", unit * all.largest), std::to_string(all.largest_x),
+                        std::to_string(all.largest_y), all.ssim ? fmt::format("{:.6f}", *all.ssim) : "-",
+                        std::to_string(foreground.pixels)});
+    }
+    return table_text(rows) +
+           "PSNR in dB, peak 1.  RMSE, bias (A - B) and max error over all pixels in 1/255 of full scale; of "
+           "fixed.* in "
+           "raw units.\n";
+}
+
+/// What fails, a line each.
+std::vector<std::string> failures(const CompareArguments& a, const Comparison& comparison) {
+    std::vector<std::string> lines;
+    for (std::size_t i = 0; i < comparison.all.size(); ++i) {
+        const Difference &all = comparison.all[i], &foreground = comparison.foreground[i];
+        const bool color =
+            all.channel.size() == 1 && std::string_view("RGBA").find(all.channel) != std::string::npos;
+        if (a.fail_above && color && all.largest * 255 > *a.fail_above)
+            lines.push_back(fmt::format("{}: error of {:.4g} LSB8 at {} {}, allowed: {:g}", all.channel,
+                                        all.largest * 255, all.largest_x, all.largest_y, *a.fail_above));
+        if (a.min_psnr && (color || all.channel == "RGB") && !foreground.identical &&
+            foreground.psnr.value_or(0) < *a.min_psnr)
+            lines.push_back(fmt::format("{}: PSNR of {:.2f} dB over the foreground, allowed: {:g} or more",
+                                        all.channel, foreground.psnr.value_or(0), *a.min_psnr));
+    }
+    return lines;
+}
+
+/// |A - B| as colours on black.
+Image sizes_of(Image image) {
+    Image sizes{image.width, image.height, {}};
+    for (Channel& channel : image.channels)
+        if (channel.name == "R" || channel.name == "G" || channel.name == "B") {
+            for (float& value : channel.values) value = std::fabs(value);
+            sizes.channels.push_back(std::move(channel));
+        }
+    return sizes;
+}
+
+void write_difference(const CompareArguments& a, const Image& x, const Image& y) {
+    const Image signed_difference = difference(x, y, a.gain);
+    const std::string extension = std::filesystem::path(a.diff).extension().string();
+    const double black[3] = {0, 0, 0};
+    if (extension == ".exr")
+        write_exr(signed_difference, a.diff, {{"squint.version", version()}});
+    else if (extension == ".png")
+        write_preview_png(sizes_of(signed_difference), a.diff, black);
+    else
+        throw InputError(fmt::format("--diff {}: the name must end in .exr or .png", a.diff));
+}
+
+}  // namespace
+
+int run(const CompareArguments& a) {
+    const Image x = read_image(a.a), y = read_image(a.b);
+    Comparison comparison;
+    std::vector<std::string> failed;
+    try {
+        comparison = compare(x, y, a.srgb);
+        failed = failures(a, comparison);
+        if (!a.diff.empty()) write_difference(a, x, y);
+    } catch (const InputError& error) {
+        if (!comparison.all.empty()) throw;  // the pictures are well: the difference cannot be written
+        failed = {error.what()};
+    }
+    if (a.json)
+        print_json(Json{{"schema", "squint.compare/1"},
+                        {"version", version()},
+                        {"a", a.a},
+                        {"b", a.b},
+                        {"transfer", a.srgb ? "srgb" : "linear"},
+                        {"channels", json_of(comparison)},
+                        {"failed", failed}});
+    else if (!comparison.all.empty())
+        print(figures_text(comparison, x));
+    for (const std::string& line : failed)
+        std::fputs(fmt::format("squint: compare: {}\n", line).c_str(), stderr);
+    return failed.empty() ? kDone : kComparisonFailed;
+}
+
+}  // namespace squint::cli

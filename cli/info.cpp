@@ -1,0 +1,108 @@
+// squint info and squint volume: what a volume is, and writing it for other programs.
+#include "cli/common.h"
+#include "core/error.h"
+#include "core/volume_source.h"
+#include "pipeline/record.h"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+namespace squint::cli {
+namespace {
+
+/// Voxels in at most `most` equal ranges of scalars, from the least to the greatest.
+struct Histogram {
+    std::uint32_t first = 0, width = 1;  // of a range, in scalars
+    std::vector<std::int64_t> count;
+};
+
+Histogram histogram_of(const Volume& v, std::uint32_t most) {
+    Histogram h;
+    const std::uint32_t levels = v.largest - v.smallest + 1;
+    h.first = v.smallest, h.width = (levels + most - 1) / most;
+    std::vector<std::int64_t> level(v.largest + 1);
+    for (std::int64_t z = 0; z < v.dims.z; ++z)
+        for (std::int64_t y = 0; y < v.dims.y; ++y)
+            for (std::int64_t x = 0; x < v.dims.x; ++x) ++level[v.at(x, y, z)];
+    h.count.resize((levels + h.width - 1) / h.width);
+    for (std::uint32_t s = v.smallest; s <= v.largest; ++s) h.count[(s - h.first) / h.width] += level[s];
+    return h;
+}
+
+std::string histogram_text(const Volume& v) {
+    const Histogram h = histogram_of(v, 24);
+    const double most = std::log1p(static_cast<double>(*std::max_element(h.count.begin(), h.count.end())));
+    std::vector<std::vector<std::string>> rows{{"from value", "voxels", "share", "(bars are logarithmic)"}};
+    for (std::size_t i = 0; i < h.count.size(); ++i) {
+        const double value = v.value_scale * (h.first + static_cast<double>(i) * h.width) + v.value_offset;
+        const auto count = static_cast<double>(h.count[i]);
+        rows.push_back(
+            {fmt::format("{:g}", value), std::to_string(h.count[i]),
+             fmt::format("{:.2f} %", 100 * count / static_cast<double>(v.voxels())),
+             std::string(static_cast<std::size_t>(std::lround(40 * std::log1p(count) / most)), '#')});
+    }
+    return table_text(rows, "  ");
+}
+
+std::string info_text(const Volume& v) {
+    std::string text = v.name + "\n";
+    const auto line = [&](const char* what, const std::string& value) {
+        text += fmt::format("  {:<9} {}\n", what, value);
+    };
+    line("dims",
+         fmt::format("{} x {} x {} = {} voxels, {} in memory", v.dims.x, v.dims.y, v.dims.z, v.voxels(),
+                     text_of_bytes(v.voxels() * static_cast<std::int64_t>(v.scalar_bytes()))));
+    line("type",
+         fmt::format("{}, levels of {} bits", v.type == ScalarType::u8 ? "u8" : "u16", v.scalar_bits));
+    line("spacing", fmt::format("{:g} {:g} {:g}", v.spacing.x, v.spacing.y, v.spacing.z));
+    line("origin", fmt::format("{:g} {:g} {:g}", v.origin.x, v.origin.y, v.origin.z));
+    line("scalars", fmt::format("{} to {}", v.smallest, v.largest));
+    line("values", fmt::format("{:g} to {:g} (value = {:g} * scalar + {:g})",
+                               v.value_scale * v.smallest + v.value_offset,
+                               v.value_scale * v.largest + v.value_offset, v.value_scale, v.value_offset));
+    line("hash", v.content_hash);
+    return text;
+}
+
+}  // namespace
+
+int run(const InfoArguments& a) {
+    std::vector<std::string> notes;
+    const auto volume = load(scene_of_volume(a.volume, a.overrides), notes);
+    if (!a.json) {
+        std::string text = info_text(*volume);
+        for (const std::string& note : notes) text += "  note: " + note + "\n";
+        print(text + "\nhistogram\n" + histogram_text(*volume));
+        return kDone;
+    }
+    nlohmann::ordered_json json = json_of(*volume);
+    const Histogram h = histogram_of(*volume, 256);
+    json["histogram"] = {{"first_scalar", h.first}, {"scalars_per_bin", h.width}, {"counts", h.count}};
+    json["notes"] = notes;
+    print_json(json);
+    return kDone;
+}
+
+int run(const VolumeArguments& a) {
+    if (std::filesystem::path(a.output).extension() != ".nrrd")
+        throw InputError(fmt::format("-o {}: the name must end in .nrrd", a.output));
+    std::vector<std::string> notes;
+    const auto volume = load(scene_of_volume(a.volume, a.overrides), notes);
+    save_nrrd(*volume, a.output);
+    std::fputs(fmt::format("{}: {}x{}x{} voxels of {} bits from {}\n", a.output, volume->dims.x,
+                           volume->dims.y, volume->dims.z, 8 * volume->scalar_bytes(), volume->name)
+                   .c_str(),
+               stderr);
+    return kDone;
+}
+
+int run(const Text& text) {
+    print(text.text);
+    return kDone;
+}
+
+}  // namespace squint::cli

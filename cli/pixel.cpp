@@ -1,0 +1,96 @@
+// squint pixel: every wire of one ray, sample by sample.
+#include "cli/common.h"
+#include "core/error.h"
+#include "pipeline/model.h"
+#include "pipeline/record.h"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <cmath>
+
+namespace squint::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+bool wanted(const PixelArguments& a, std::int64_t slab) {
+    return slab < 0 || (slab >= a.samples.first && (a.samples.second < 0 || slab <= a.samples.second));
+}
+const Format& format_of(const Plan& plan, int wire) {
+    return plan.specs.spec[static_cast<std::size_t>(wire)].format;
+}
+
+std::string heading(const Plan& plan, const PixelArguments& a, const RayTrace& trace) {
+    const RaySetup& s = trace.setup;
+    std::string text = fmt::format("pixel {} {}: {} slabs", a.column, a.row, s.slabs);
+    if (s.slabs == 0) return text + ", the ray misses the volume\n";
+    text += fmt::format(", the last {:.6g} of a step long; a step is {:g} world units\n", s.last_length,
+                        plan.step_world);
+    text += fmt::format("first sample at voxel {:.6f} {:.6f} {:.6f}, V = {:.6f} {:.6f} {:.6f}\n", s.first.x,
+                        s.first.y, s.first.z, s.step.x, s.step.y, s.step.z);
+    if (plan.real) text += "precision is real; shown are the words of preset wide\n";
+    return text + "\n";
+}
+
+std::string events_text(const Plan& plan, const PixelArguments& a, const RayTrace& trace) {
+    std::vector<std::vector<std::string>> rows{{"slab", "wire", "format", "value", "raw", "exact", "error"}};
+    std::int64_t last = -2;
+    for (const RayTrace::Event& e : trace.events) {
+        if (!wanted(a, e.slab)) continue;
+        const auto w = static_cast<std::size_t>(e.event.wire);
+        const Format& format = format_of(plan, e.event.wire);
+        // The exact value in the same units as the value; the error in units of the wire's last bit.
+        rows.push_back({e.slab == last ? ""
+                        : e.slab < 0   ? "set-up"
+                                       : std::to_string(e.slab),
+                        std::string(kWireInfo[w].name), to_string(format),
+                        fmt::format("{:.9g}", to_real(e.event.raw, format)), std::to_string(e.event.raw),
+                        fmt::format("{:.9g}", e.event.exact / static_cast<double>(format.one())),
+                        fmt::format("{:+.3f}", static_cast<double>(e.event.raw) - e.event.exact)});
+        last = e.slab;
+    }
+    return rows.size() == 1 ? "" : table_text(rows) + "error: value less exact, in units of the last bit\n";
+}
+
+Json json_of_trace(const Plan& plan, const PixelArguments& a, const RayTrace& trace) {
+    const RaySetup& s = trace.setup;
+    Json events = Json::array();
+    for (const RayTrace::Event& e : trace.events)
+        if (wanted(a, e.slab)) {
+            const Format& format = format_of(plan, e.event.wire);
+            events.push_back({{"slab", e.slab},
+                              {"wire", kWireInfo[static_cast<std::size_t>(e.event.wire)].name},
+                              {"format", to_string(format)},
+                              {"raw", e.event.raw},
+                              {"value", to_real(e.event.raw, format)},
+                              {"exact", e.event.exact / static_cast<double>(format.one())}});
+        }
+    return {{"schema", "squint.pixel/1"},
+            {"version", version()},
+            {"column", a.column},
+            {"row", a.row},
+            {"slabs", s.slabs},
+            {"last_length", s.last_length},
+            {"first_voxel", {s.first.x, s.first.y, s.first.z}},
+            {"step_voxels", {s.step.x, s.step.y, s.step.z}},
+            {"color", {trace.color[0], trace.color[1], trace.color[2], trace.color[3]}},
+            {"events", events}};
+}
+
+}  // namespace
+
+int run(const PixelArguments& a) {
+    const Plan plan = plan_of(a.scene);
+    if (a.column < 0 || a.column >= plan.camera.width || a.row < 0 || a.row >= plan.camera.height)
+        throw InputError(fmt::format("pixel: {} {} is outside the picture; allowed: 0 to {} and 0 to {}",
+                                     a.column, a.row, plan.camera.width - 1, plan.camera.height - 1));
+    const RayTrace trace = trace_ray(plan, a.column, a.row);
+    if (a.json) return print_json(json_of_trace(plan, a, trace)), kDone;
+    const auto& c = trace.color;
+    print(heading(plan, a, trace) + events_text(plan, a, trace) +
+          fmt::format("\nR {:.9g}  G {:.9g}  B {:.9g}  A {:.9g}\n", c[0], c[1], c[2], c[3]));
+    return kDone;
+}
+
+}  // namespace squint::cli

@@ -1,0 +1,143 @@
+// squint plan: what a scene exercises, and what was left out and why.
+#include "cli/common.h"
+#include "pipeline/record.h"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <array>
+
+namespace squint::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Rows = std::vector<std::vector<std::string>>;
+
+struct FindTables {
+    std::vector<TableReport>& tables;
+    void operator()(const Rescale&) const {}
+    void operator()(const Table& table) const {
+        if (table.rows() == 0) return;
+        const std::string_view name =
+            table.wire < 0 ? "table" : kWireInfo[static_cast<std::size_t>(table.wire)].name;
+        tables.push_back(
+            {std::string(name), table.rows(), table.columns(), static_cast<std::int64_t>(table.bytes()), {}});
+    }
+};
+
+/// Every table of the plan: as the plan reports them, or as its stages hold them.
+std::vector<TableReport> tables_of(const Plan& plan) {
+    if (!plan.tables.empty()) return plan.tables;
+    std::vector<TableReport> tables;
+    Plan visited = plan;
+    visit_stages(visited, FindTables{tables});
+    return tables;
+}
+
+int word_of(int bits) {
+    for (const int word : {16, 32, 64})
+        if (bits <= word) return word;
+    return 128;
+}
+
+const StageReport& stage_of(const Plan& plan, std::string_view name) {
+    for (const StageReport& stage : plan.stages)
+        if (stage.name == name) return stage;
+    return plan.stages.front();
+}
+
+std::string stages_text(const Plan& plan) {
+    Rows rows{{"stage", "", "widest operand", "widest result", "word", ""}};
+    for (const StageReport& s : plan.stages) {
+        if (s.modelled)
+            rows.push_back({s.name, plan.real ? "in double" : "modelled",
+                            std::to_string(s.needs.operand_bits), std::to_string(s.needs.result_bits),
+                            std::to_string(word_of(s.needs.result_bits)), s.why});
+        else
+            rows.push_back({s.name, "left out", "-", "-", "-", s.why});
+    }
+    return table_text(rows, "  ");
+}
+
+std::string wires_text(const Plan& plan) {
+    Rows rows{{"wire", "format", "rounding", "overflow", "width", "word", "meaning"}};
+    std::string_view stage;
+    for (int w = 0; w < kWires; ++w) {
+        const WireInfo& wire = kWireInfo[static_cast<std::size_t>(w)];
+        const StageReport& report = stage_of(plan, wire.stage);
+        if (!report.modelled) continue;
+        if (wire.stage != stage) stage = wire.stage, rows.push_back({fmt::format("[{}]", stage)});
+        const Spec& spec = plan.specs.spec[static_cast<std::size_t>(w)];
+        rows.push_back({std::string(wire.name), to_string(spec.format), to_string(spec.rounding),
+                        to_string(spec.overflow), std::to_string(spec.format.width()),
+                        std::to_string(word_of(report.needs.result_bits)), std::string(wire.meaning)});
+    }
+    return table_text(rows, "  ");
+}
+
+std::string tables_text(const Plan& plan) {
+    Rows rows{{"table", "rows", "columns", "bytes", ""}};
+    for (const TableReport& t : tables_of(plan))
+        rows.push_back(
+            {t.name, std::to_string(t.rows), std::to_string(t.columns), std::to_string(t.bytes), t.note});
+    return table_text(rows, "  ");
+}
+
+Json json_of_plan(const Plan& plan) {
+    Json stages = Json::array(), tables = Json::array();
+    for (const StageReport& s : plan.stages) {
+        stages.push_back({{"name", s.name}, {"modelled", s.modelled}, {"why", s.why}});
+        if (s.modelled)
+            stages.back().update({{"operand_bits", s.needs.operand_bits},
+                                  {"result_bits", s.needs.result_bits},
+                                  {"word_bits", word_of(s.needs.result_bits)}});
+    }
+    for (const TableReport& t : tables_of(plan))
+        tables.push_back({{"name", t.name},
+                          {"rows", t.rows},
+                          {"columns", t.columns},
+                          {"bytes", t.bytes},
+                          {"note", t.note}});
+    return {{"schema", "squint.plan/1"},
+            {"version", version()},
+            {"scene", json_of_scene(plan.scene)},
+            {"volume", json_of(*plan.volume)},
+            {"real", plan.real},
+            {"model_word_bits", plan.word_bits},
+            {"skips_empty_space", plan.skips_empty_space},
+            {"stages", stages},
+            {"wires", json_of_wires(plan)},
+            {"tables", tables},
+            {"memory", json_of(memory_of(plan, {}))},
+            {"notes", plan.notes},
+            {"warnings", plan.warnings}};
+}
+
+}  // namespace
+
+int run(const PlanArguments& a) {
+    const Plan plan = plan_of(a.scene);
+    if (a.json) return print_json(json_of_plan(plan)), kDone;
+    const Volume& v = *plan.volume;
+    const Memory memory = memory_of(plan, {});
+    std::string text =
+        fmt::format("{}: {}x{} pixels, {} in {} ({}x{}x{}, {} bits), precision {}\n",
+                    plan.scene.name.empty() ? "built-in scene" : plan.scene.name, plan.camera.width,
+                    plan.camera.height, name_of(plan.scene.classification.method), v.name, v.dims.x, v.dims.y,
+                    v.dims.z, v.scalar_bits, plan.scene.precision.preset);
+    text += "\nstages (bits with sign)\n" + stages_text(plan);
+    text += plan.real ? "\nevery wire is a double: nothing is rounded\n" : "\nwires\n" + wires_text(plan);
+    text += "\ntables\n" + tables_text(plan);
+    text += fmt::format("\nmemory: volume {}, tables {}, picture {}\n", text_of_bytes(memory.volume),
+                        text_of_bytes(memory.tables), text_of_bytes(memory.image));
+    text += plan.real ? "model: double\n" : fmt::format("model: {}-bit integers\n", plan.word_bits);
+    text += plan.skips_empty_space
+                ? "empty space: may be left out\n"
+                : "empty space: visited, since a transparent sample is not the identity here\n";
+    for (const std::string& note : plan.notes) text += "note: " + note + "\n";
+    for (const std::string& warning : plan.warnings) text += "warning: " + warning + "\n";
+    print(text);
+    return kDone;
+}
+
+}  // namespace squint::cli

@@ -1,0 +1,230 @@
+// squint render: a scene becomes an EXR, a preview and a record.
+#include "cli/common.h"
+#include "core/atomic_file.h"
+#include "core/error.h"
+#include "pipeline/record.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+#include <nlohmann/json.hpp>
+
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <mutex>
+
+namespace squint::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// A bar on standard error while a picture is being made; nothing where that is no terminal.
+class ProgressBar {
+  public:
+    explicit ProgressBar(bool wanted) : shown_(wanted && isatty(STDERR_FILENO)) {}
+    ~ProgressBar() {
+        if (shown_) std::fputs("\r\033[K", stderr);
+    }
+    void operator()(double part) {
+        if (!shown_) return;
+        const std::lock_guard lock(mutex_);
+        const int percent = static_cast<int>(100 * part);
+        if (percent <= percent_) return;
+        percent_ = percent;
+        const std::string bar(static_cast<std::size_t>(percent * 2 / 5), '#');
+        std::fputs(fmt::format("\r[{:<40}] {:3} %", bar, percent).c_str(), stderr);
+    }
+
+  private:
+    bool shown_;
+    int percent_ = -1;
+    std::mutex mutex_;
+};
+
+/// "out.exr" -> "out.0007.exr" in a turntable.
+std::string frame_path(const std::string& path, int frame, int frames) {
+    if (frames == 1 || path.empty() || path == "-") return path;
+    std::filesystem::path numbered(path);
+    const std::string extension = numbered.extension().string();
+    numbered.replace_extension(fmt::format(".{:04}{}", frame, extension));
+    return numbered.string();
+}
+
+/// Refuses at once what would be refused after the work.
+void check_output(const std::string& path, const char* flag, const char* extension) {
+    if (path.empty()) return;
+    const std::filesystem::path file(path);
+    std::error_code ignored;
+    if (extension && file.extension() != extension && !std::filesystem::is_character_file(file, ignored))
+        throw InputError(fmt::format("{} {}: the name must end in {}", flag, path, extension));
+    const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
+    if (!std::filesystem::is_directory(folder, ignored))
+        throw InputError(fmt::format("{}: cannot write: there is no folder {}", path, folder.string()));
+    if (access(folder.c_str(), W_OK) != 0 && !std::filesystem::exists(file, ignored))
+        throw InputError(fmt::format("{}: cannot write: {}", path, std::strerror(errno)));
+}
+
+void refuse_beyond(std::int64_t limit, std::int64_t needed, const std::string& what) {
+    if (limit > 0 && needed > limit)
+        throw InputError(fmt::format("--max-memory: {} needs {}, allowed: {}", what, text_of_bytes(needed),
+                                     text_of_bytes(limit)));
+}
+
+std::string share(std::int64_t part, std::int64_t of) {
+    if (part == 0) return "-";
+    return fmt::format("{:.3g} %", 100 * static_cast<double>(part) / static_cast<double>(of));
+}
+
+/// Digits, from no bit to all: powers of ten of the values that need so many bits.
+std::string magnitudes(const WireStatistics& s, const Format& format) {
+    std::string digits;
+    for (int b = 0; b <= format.integer_bits + format.fraction_bits; ++b) {
+        const std::int64_t count = s.magnitude[static_cast<std::size_t>(b)];
+        digits +=
+            count == 0 ? '.' : static_cast<char>('0' + std::min(9, static_cast<int>(std::log10(count))));
+    }
+    return digits;
+}
+
+std::string audit_text(const Plan& plan, const RenderStatistics& statistics) {
+    std::vector<std::vector<std::string>> rows{
+        {"wire", "format", "count", "min", "max", "inexact", "saturated", "wrapped", "bits"}};
+    for (std::size_t w = 0; w < statistics.wires.size(); ++w) {
+        const WireStatistics& s = statistics.wires[w];
+        const Format& format = plan.specs.spec[w].format;
+        if (s.count > 0)
+            rows.push_back({std::string(kWireInfo[w].name), to_string(format), std::to_string(s.count),
+                            fmt::format("{:.6g}", to_real(s.smallest, format)),
+                            fmt::format("{:.6g}", to_real(s.largest, format)), share(s.inexact, s.count),
+                            share(s.saturated, s.count), share(s.wrapped, s.count), magnitudes(s, format)});
+    }
+    return table_text(rows) +
+           "bits: one place for each number of bits a value needs, from none to all of its format's; a digit "
+           "d "
+           "means 10^d values or more\n";
+}
+
+std::string text_of_error(const Comparison& comparison) {
+    const Difference& d = comparison.channel("RGB", true);
+    if (d.identical) return "identical";
+    return fmt::format("{:.1f} dB, largest error {:.2f} of 255", d.psnr.value_or(0), 255 * d.largest);
+}
+
+std::string error_text(const Errors& errors) {
+    std::string text;
+    if (errors.against_real)
+        text += fmt::format("  rounding, against double: {} (foreground, linear light)\n",
+                            text_of_error(*errors.against_real));
+    for (const StageError& stage : errors.stages)
+        text += fmt::format("    {:<16} alone: {}\n", stage.stage, text_of_error(stage.against_real));
+    if (errors.against_reference)
+        text += fmt::format("  everything, against the reference: {}\n",
+                            text_of_error(*errors.against_reference));
+    return text;
+}
+
+struct Job {
+    const RenderArguments& arguments;
+    Scene scene;
+    std::shared_ptr<const Volume> volume;
+    std::string output;  // as asked for, or the default
+};
+
+/// Renders, writes and reports one picture; returns its record.
+Json render_frame(const Job& job, int frame) {
+    const RenderArguments& a = job.arguments;
+    const Plan plan = make_plan(job.scene, job.volume, frame);
+    const RenderStatistics nothing;
+    refuse_beyond(a.max_memory, memory_of(plan, nothing).total(), "the scene");
+
+    ProgressBar bar(!a.quiet);
+    RenderOptions options = a.options;
+    options.cancelled = &interrupted;
+    options.progress = [&](double part) { bar(part); };
+    Rendering rendering;
+    Errors errors;
+    {
+        const Interruptible here;
+        rendering = render(plan, options);
+        options.progress = nullptr;
+        if (a.error) errors = rounding_errors(plan, rendering.image, options, frame);
+    }
+    const int frames = job.scene.camera.turntable;
+    const std::string exr = frame_path(job.output, frame, frames), png = frame_path(a.preview, frame, frames);
+    if (!exr.empty()) write_exr(rendering.image, exr, exr_attributes(plan, frame));
+    if (!png.empty()) {
+        const Vec3& b = job.scene.image.background;
+        const double background[3] = {b.x, b.y, b.z};
+        write_preview_png(rendering.image, png, background);
+    }
+    const bool measured = a.error || a.reference;
+    if (!a.quiet) {
+        const RenderStatistics& s = rendering.statistics;
+        std::fputs(
+            fmt::format("{}: {}x{} pixels, {} ({}), {:.2f} s, {} samples on {} rays, {} thread{}\n",
+                        !exr.empty()             ? exr
+                        : !png.empty()           ? png
+                        : job.scene.name.empty() ? "built-in scene"
+                                                 : job.scene.name,
+                        plan.camera.width, plan.camera.height, s.path, s.why, s.seconds,
+                        text_of_count(s.samples), text_of_count(s.rays), s.threads, s.threads == 1 ? "" : "s")
+                .c_str(),
+            stderr);
+        for (const std::string& warning : plan.warnings)
+            std::fputs(fmt::format("  warning: {}\n", warning).c_str(), stderr);
+        if (measured) std::fputs(error_text(errors).c_str(), stderr);
+    }
+    if (a.options.audit && a.json != "-") print(audit_text(plan, rendering.statistics));
+    Json record = json_of(plan, rendering, measured ? &errors : nullptr, a.options.audit);
+    record["frame"] = frame;
+    if (frame == 0) record["wires"] = json_of_wires(plan), record["warnings"] = plan.warnings;
+    return record;
+}
+
+std::string default_output(const RenderArguments& a) {
+    if (!a.preview.empty() || !a.json.empty() || a.options.audit) return {};
+    return a.scene.file.empty() ? "squint.exr" : std::filesystem::path(a.scene.file).stem().string() + ".exr";
+}
+
+}  // namespace
+
+int run(const RenderArguments& a) {
+    if (a.scene_reference) return print(scene_reference_markdown()), kDone;
+    if (a.reference) throw InputError("--reference: this build has no reference renderer");
+    const std::string output = a.output.empty() ? default_output(a) : a.output;
+    check_output(output, "-o", ".exr");
+    check_output(a.preview, "--preview", ".png");
+    if (a.json != "-") check_output(a.json, "--json", nullptr);
+
+    const Scene scene = read(a.scene);
+    refuse_beyond(a.max_memory, image_bytes(scene),
+                  fmt::format("a picture of {}x{} pixels", scene.image.width, scene.image.height));
+    std::vector<std::string> notes;
+    const Job job{a, scene, load(scene, notes, a.max_memory), output};
+    if (!a.quiet)
+        for (const std::string& note : notes) std::fputs(fmt::format("  note: {}\n", note).c_str(), stderr);
+
+    Json pictures = Json::array();
+    for (int frame = 0; frame < scene.camera.turntable; ++frame) pictures.push_back(render_frame(job, frame));
+    if (a.json.empty()) return kDone;
+    Json record{{"schema", "squint.render/1"},
+                {"version", version()},
+                {"scene", json_of_scene(scene)},
+                {"volume", json_of(*job.volume)},
+                {"wires", pictures[0]["wires"]},
+                {"warnings", pictures[0]["warnings"]},
+                {"notes", notes},
+                {"pictures", Json::array()}};
+    for (Json& picture : pictures)
+        picture.erase("wires"), picture.erase("warnings"), record["pictures"].push_back(picture);
+    if (a.json == "-")
+        print_json(record);
+    else
+        write_text_whole(a.json, record.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+    return kDone;
+}
+
+}  // namespace squint::cli

@@ -1,0 +1,247 @@
+#include "pipeline/record.h"
+
+#include "core/hash.h"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <cmath>
+#include <filesystem>
+
+namespace squint {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Image colors_of(const Image& image) {
+    Image colors{image.width, image.height, {}};
+    for (const char* name : {"R", "G", "B", "A"})
+        if (const Channel* channel = image.find(name)) colors.channels.push_back(*channel);
+    return colors;
+}
+
+/// "/home/ann/head.nrrd" -> "head.nrrd": a record names no folder of this machine.
+std::string without_folders(const std::string& quoted) {
+    if (!quoted.starts_with("\"/")) return quoted;
+    return '"' + quoted.substr(quoted.rfind('/') + 1);
+}
+
+const StageReport* find_stage(const Plan& plan, std::string_view name) {
+    for (const StageReport& stage : plan.stages)
+        if (stage.name == name) return &stage;
+    return nullptr;
+}
+
+struct SumTables {
+    std::int64_t& bytes;
+    void operator()(const Rescale&) const {}
+    void operator()(const Table& table) const { bytes += static_cast<std::int64_t>(table.bytes()); }
+};
+
+}  // namespace
+
+std::string version() {
+    return SQUINT_VERSION;
+}
+
+Attributes exr_attributes(const Plan& plan, int frame) {
+    Attributes attributes;
+    for (const auto& [key, value] : resolved(plan.scene)) {
+        const bool path = key.ends_with(".file") || key == "precision.preset";
+        attributes["squint." + key] = path ? without_folders(value) : value;
+    }
+    for (int w = 0; w < kWires; ++w) {
+        const auto wire = static_cast<Wire>(w);
+        attributes[fmt::format("squint.wire.{}", info(wire).name)] =
+            plan.real ? "real" : to_string(plan.specs[wire]);
+    }
+    attributes["squint.volume.hash"] = plan.volume->content_hash;
+    attributes["squint.version"] = version();
+    if (plan.scene.camera.turntable > 1) attributes["squint.frame"] = std::to_string(frame);
+    return attributes;
+}
+
+std::string picture_hash(const Image& image) {
+    Hasher hasher;
+    hasher.number(static_cast<std::uint64_t>(image.width));
+    hasher.number(static_cast<std::uint64_t>(image.height));
+    for (const Channel& channel : image.channels) {
+        hasher.text(channel.name);
+        hasher.bytes(channel.words.data(), channel.words.size() * sizeof(std::uint32_t));
+        hasher.bytes(channel.values.data(), channel.values.size() * sizeof(float));
+    }
+    return hasher.hex();
+}
+
+std::int64_t image_bytes(const Scene& scene) {
+    const OutputSettings& o = scene.output;
+    const std::int64_t channels = 4 + 2 * o.depth + 3 * o.normals + o.samples + o.transparency + 4 * o.fixed;
+    return 4 * channels * scene.image.width * scene.image.height;
+}
+
+std::int64_t table_bytes(const Plan& plan) {
+    std::int64_t bytes = 0;
+    Plan visited = plan;  // tables are shared, not copied
+    visit_stages(visited, SumTables{bytes});
+    return bytes + static_cast<std::int64_t>(plan.entries.entry.size() * sizeof(Entry));
+}
+
+Memory memory_of(const Plan& plan, const RenderStatistics& statistics) {
+    const Volume& v = *plan.volume;
+    return {.volume = v.voxels() * static_cast<std::int64_t>(v.scalar_bytes()),
+            .tables = table_bytes(plan),
+            .image = image_bytes(plan.scene),
+            .buffers = statistics.bytes};
+}
+
+Plan real_plan(const Plan& plan, int frame) {
+    Scene scene = plan.scene;
+    scene.precision = {};
+    scene.precision.preset = "real";
+    return make_plan(scene, plan.volume, frame);
+}
+
+std::array<bool, kWires> wires_of(std::string_view stage) {
+    std::array<bool, kWires> wires{};
+    for (std::size_t w = 0; w < wires.size(); ++w) wires[w] = stage.empty() || kWireInfo[w].stage == stage;
+    return wires;
+}
+
+Errors rounding_errors(const Plan& plan, const Image& picture, const RenderOptions& options, int frame) {
+    RenderOptions plain = options;
+    plain.audit = false;
+    plain.path = Path::automatic, plain.target.clear();
+    const Image real = render(real_plan(plan, frame), plain).image;
+    Errors errors;
+    errors.against_real = compare_colors(picture, real);
+    for (const std::string_view name : kStages) {
+        const StageReport* stage = find_stage(plan, name);
+        if (plan.real || !stage || !stage->modelled) continue;
+        Plan alone = plan;
+        set_active(alone, wires_of(name));
+        errors.stages.push_back({std::string(name), compare_colors(render(alone, plain).image, real)});
+    }
+    return errors;
+}
+
+Comparison compare_colors(const Image& picture, const Image& other) {
+    return compare(colors_of(picture), colors_of(other));
+}
+
+// ------------------------------------------------------------------------------------------------ JSON
+
+Json json_of(const Difference& d) {
+    Json json{{"pixels", d.pixels},
+              {"identical", d.identical},
+              {"psnr", d.psnr ? Json(*d.psnr) : Json(nullptr)},
+              {"rmse_lsb8", d.rmse * 255},
+              {"bias_lsb8", d.bias * 255},
+              {"max_error_lsb8", d.largest * 255},
+              {"max_error_at", {d.largest_x, d.largest_y}}};
+    if (d.ssim) json["ssim"] = *d.ssim;
+    return json;
+}
+
+Json json_of(const Comparison& comparison) {
+    Json all = Json::object(), foreground = Json::object();
+    for (const Difference& d : comparison.all) all[d.channel] = json_of(d);
+    for (const Difference& d : comparison.foreground) foreground[d.channel] = json_of(d);
+    return {{"all", all}, {"foreground", foreground}};
+}
+
+Json json_of(const Errors& errors) {
+    Json json = Json::object();
+    if (errors.against_real) json["against_real"] = json_of(*errors.against_real);
+    if (errors.against_reference) json["against_reference"] = json_of(*errors.against_reference);
+    if (errors.against_real) {
+        json["stages"] = Json::array();
+        for (const StageError& stage : errors.stages)
+            json["stages"].push_back({{"stage", stage.stage}, {"against_real", json_of(stage.against_real)}});
+    }
+    return json;
+}
+
+Json json_of(const Memory& m) {
+    return {{"volume_bytes", m.volume},
+            {"table_bytes", m.tables},
+            {"image_bytes", m.image},
+            {"buffer_bytes", m.buffers},
+            {"total_bytes", m.total()}};
+}
+
+Json json_of(const Volume& v) {
+    return {{"name", v.name},
+            {"dims", {v.dims.x, v.dims.y, v.dims.z}},
+            {"type", v.type == ScalarType::u8 ? "u8" : "u16"},
+            {"scalar_bits", v.scalar_bits},
+            {"spacing", {v.spacing.x, v.spacing.y, v.spacing.z}},
+            {"origin", {v.origin.x, v.origin.y, v.origin.z}},
+            {"scalar_range", {v.smallest, v.largest}},
+            {"value_range",
+             {v.value_scale * v.smallest + v.value_offset, v.value_scale * v.largest + v.value_offset}},
+            {"hash", v.content_hash}};
+}
+
+Json json_of_scene(const Scene& scene) {
+    Json json = Json::object();
+    for (const auto& [key, value] : resolved(scene)) json[key] = value;
+    return json;
+}
+
+Json json_of_wires(const Plan& plan) {
+    Json json = Json::object();
+    for (int w = 0; w < kWires; ++w) {
+        const auto wire = static_cast<Wire>(w);
+        const Spec& spec = plan.specs[wire];
+        json[std::string(info(wire).name)] = {{"stage", info(wire).stage},
+                                              {"format", to_string(spec.format)},
+                                              {"rounding", to_string(spec.rounding)},
+                                              {"overflow", to_string(spec.overflow)},
+                                              {"width", spec.format.width()}};
+    }
+    return json;
+}
+
+Json json_of_audit(const Plan& plan, const RenderStatistics& statistics) {
+    Json json = Json::object();
+    for (std::size_t w = 0; w < statistics.wires.size(); ++w) {
+        const WireStatistics& s = statistics.wires[w];
+        if (s.count == 0) continue;
+        const Format& format = plan.specs.spec[w].format;
+        std::size_t bits = s.magnitude.size();
+        while (bits > 1 && s.magnitude[bits - 1] == 0) --bits;
+        Json magnitude = Json::array();
+        for (std::size_t b = 0; b < bits; ++b) magnitude.push_back(s.magnitude[b]);
+        json[std::string(kWireInfo[w].name)] = {{"format", to_string(format)},
+                                                {"count", s.count},
+                                                {"min_raw", s.smallest},
+                                                {"max_raw", s.largest},
+                                                {"min", to_real(s.smallest, format)},
+                                                {"max", to_real(s.largest, format)},
+                                                {"inexact", s.inexact},
+                                                {"saturated", s.saturated},
+                                                {"wrapped", s.wrapped},
+                                                {"magnitude_bits", magnitude}};
+    }
+    return json;
+}
+
+Json json_of(const Plan& plan, const Rendering& rendering, const Errors* errors, bool audit) {
+    const RenderStatistics& s = rendering.statistics;
+    Json json{{"hash", picture_hash(rendering.image)},
+              {"seconds", s.seconds},
+              {"setup_seconds", s.setup_seconds},
+              {"rays", s.rays},
+              {"samples", s.samples},
+              {"path", s.path},
+              {"target", s.target},
+              {"layout", s.layout},
+              {"why", s.why},
+              {"threads", s.threads},
+              {"memory", json_of(memory_of(plan, s))}};
+    if (errors) json["error"] = json_of(*errors);
+    if (audit) json["audit"] = json_of_audit(plan, s);
+    return json;
+}
+
+}  // namespace squint
