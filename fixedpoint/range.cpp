@@ -38,8 +38,15 @@ int signed_bits(Range x) {
 Range noted(Range result) {
     result = {cap(result.low), cap(result.high)};
     Range::needs.result_bits = std::max(Range::needs.result_bits, signed_bits(result));
+    Range::needs.lane_bits = std::max(Range::needs.lane_bits, signed_bits(result));
     return result;
 }
+namespace {
+// A result on the way to a smaller one: in lanes it may wrap and come back.
+void noted_in_passing(Int128 low, Int128 high) {
+    Range::needs.result_bits = std::max(Range::needs.result_bits, signed_bits({cap(low), cap(high)}));
+}
+}  // namespace
 Range operator+(Range a, Range b) {
     return noted({a.low + b.low, a.high + b.high});
 }
@@ -79,14 +86,15 @@ Range gather(const Table& table, Range, int column) {
     return noted(all);
 }
 Range blend(Range v0, Range v1, Range weight, int weight_bits) {
-    // The product may pass the word's end on the way: integers wrap and come back, for the sum lies between
-    // v0 and v1.
-    note_operands(v1 - v0, weight);
+    const Range difference = v1 - v0;
+    note_operands(difference, weight);
+    noted_in_passing(2 * product(difference.low, weight.high), 2 * product(difference.high, weight.high));
     const Range hull{std::min(v0.low, v1.low), std::max(v0.high, v1.high)};
     return shift_left(hull, weight_bits);
 }
-Range affine(Range, Range k, Range v, std::int64_t low, std::int64_t high) {
+Range affine(Range p, Range k, Range v, std::int64_t low, std::int64_t high) {
     note_operands(k, v);
+    noted_in_passing(p.low + product(k.high, v.low), p.high + product(k.high, v.high));
     return noted({low, high});
 }
 Range within(Range x, std::int64_t low, std::int64_t high) {
@@ -120,12 +128,18 @@ Range quantise(Range x, const Rescale& to) {
     return {limit(rounded.low, to), limit(rounded.high, to)};
 }
 Range quotient(Range numerator, Range denominator, const Rescale& to) {
-    const Range scaled = shift_left(numerator, -to.shift);
+    const Int128 factor = Int128{1} << -to.shift;
+    const Int128 scaled_high = product(std::max<Int128>(numerator.high, 0), factor);
+    const Int128 scaled_low = product(std::max<Int128>(numerator.low, 0), factor);
     const Int128 smallest = std::max<Int128>(denominator.low, 1),
                  largest = std::max<Int128>(denominator.high, 1);
-    noted({0, 2 * largest});
-    // Not noted: whatever the word, a quotient is limited before it is cut to size.
-    const Range q{std::max<Int128>(scaled.low, 0) / largest, std::max<Int128>(scaled.high, 0) / smallest + 1};
+    noted_in_passing(0, scaled_high);
+    noted({0, 4 * largest});
+    // Lanes estimate in floating point: 22 bits of result from 32-bit lanes, 48 from 64-bit ones.  They
+    // saturate only.
+    const int lanes = to.wraps || to.width > 48 ? 65 : to.width > 22 ? 33 : 0;
+    Range::needs.lane_bits = std::max(Range::needs.lane_bits, lanes);
+    const Range q{scaled_low / largest, scaled_high / smallest + 1};
     if (q.high <= to.highest) return q;
     if (to.wire >= 0) Range::limited |= std::uint64_t{1} << to.wire;
     return to.wraps ? Range{to.lowest, to.highest} : Range{std::min<Int128>(q.low, to.highest), to.highest};

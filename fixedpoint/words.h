@@ -325,9 +325,11 @@ Real<T> quotient(Real<T> numerator, Real<T> denominator, const Rescale& to) {
 struct WordNeeds {
     int operand_bits = 0;  // the widest factor of a multiplication, sign included
     int result_bits = 0;   // the widest exact result, sign included
+    int lane_bits = 0;     // the same where numbers may wrap on the way to a result that fits: lanes do
     void merge(const WordNeeds& other) {
-        operand_bits = std::max(operand_bits, other.operand_bits),
+        operand_bits = std::max(operand_bits, other.operand_bits);
         result_bits = std::max(result_bits, other.result_bits);
+        lane_bits = std::max(lane_bits, other.lane_bits);
     }
 };
 

@@ -65,12 +65,12 @@ WireSpecs standard(const PresetInputs& in) {
     WireSpecs w{};
     w[Wire::location] = u(in.location_bits, clip(31 - in.location_bits), r);
     w[Wire::direction] = s(in.direction_bits, w[Wire::location].format.fraction_bits, r);
-    w[Wire::weight] = u(1, weight, r), w[Wire::length] = u(1, 15, r);
+    w[Wire::weight] = u(1, weight, r), w[Wire::length] = u(1, 9, r);
     w[Wire::lerp_x] = w[Wire::lerp_y] = u(scalar, level, r),
     w[Wire::sample] = u(scalar, std::min(12, 24 - scalar), r);
     w[Wire::gradient_lerp] = w[Wire::gradient] = s(scalar, gradient, r), w[Wire::spacing] = u(1, 12, r);
     w[Wire::normal] = s(1, 15, r);
-    w[Wire::classification_input] = u(in.entry_bits, 10, r);
+    w[Wire::classification_input] = u(in.entry_bits, 8, r);
     w[Wire::table_color] = w[Wire::table_alpha] = u(1, 15, r);
     w[Wire::table_extinction] = w[Wire::table_moment] =
         u(in.total_depth_bits, std::min(20, clip(31 - in.total_depth_bits)), r);
@@ -95,7 +95,7 @@ WireSpecs wide(const PresetInputs& in) {
     w[Wire::lerp_x] = w[Wire::lerp_y] = w[Wire::sample] = u(in.scalar_bits, 20, r);
     w[Wire::gradient_lerp] = w[Wire::gradient] = s(in.scalar_bits, 16, r), w[Wire::spacing] = u(1, 20, r),
     w[Wire::normal] = s(1, 20, r);
-    w[Wire::classification_input] = u(in.entry_bits, 20, r);
+    w[Wire::classification_input] = u(in.entry_bits, std::min(18, 31 - in.entry_bits), r);
     w[Wire::table_extinction] = w[Wire::table_moment] = u(in.total_depth_bits, 24, r),
     w[Wire::slab_depth] = u(5, 24, r);
     for (const Wire wire :

@@ -82,8 +82,11 @@ EntryLookup build_entry_lookup(const ClassificationInputs& in) {
     lookup.to_alpha = Rescale(stored.format.fraction_bits + in.input_fraction, slab_alpha,
                               static_cast<int>(Wire::slab_alpha));
     lookup.length_fraction = specs[Wire::length].format.fraction_bits;
-    lookup.to_depth = Rescale(extinction.format.fraction_bits + in.input_fraction + lookup.length_fraction,
-                              specs[Wire::slab_depth], static_cast<int>(Wire::slab_depth));
+    const Spec depth = specs[Wire::slab_depth];
+    lookup.to_depth = Rescale(extinction.format.fraction_bits + in.input_fraction, depth,
+                              static_cast<int>(Wire::slab_depth));
+    lookup.to_shorter = Rescale(depth.format.fraction_bits + lookup.length_fraction, depth,
+                                static_cast<int>(Wire::slab_depth));
     lookup.color_fraction = specs[Wire::slab_ratio].format.fraction_bits;
     lookup.alpha_fraction = slab_alpha.format.fraction_bits;
     lookup.one_alpha = std::min(slab_alpha.format.one(), slab_alpha.format.largest());

@@ -55,7 +55,8 @@ struct EntryLookup {
     int last_segment = 0;  // entries - 2
     bool has_opaque = false;
     Rescale to_color, to_alpha;  // lerps between entries
-    Rescale to_depth;            // extinction (lerp exact) * length
+    Rescale to_depth;            // extinction between entries
+    Rescale to_shorter;          // times the length of a slab
     int length_fraction = 0;
     std::int64_t one_alpha = 0;
     int color_fraction = 0, alpha_fraction = 0;  // of the straight colour and the opacity that come out
@@ -63,7 +64,7 @@ struct EntryLookup {
 
     template <class V>
     void visit(V&& v) {
-        v(table), v(to_color), v(to_alpha), v(to_depth), v(opacity.rows), v(opacity.to_alpha);
+        v(table), v(to_color), v(to_alpha), v(to_depth), v(to_shorter), v(opacity.rows), v(opacity.to_alpha);
     }
 };
 
@@ -170,7 +171,8 @@ HWY_INLINE Slab<W> classify_point(const EntryLookup& e, W input, W length) {
     slab.alpha = quantise(entry_blend(e, at, EntryLookup::alpha), e.to_alpha);
     const auto shorter = length < full;
     if (any(shorter)) {
-        const W depth = quantise(entry_blend(e, at, EntryLookup::extinction) * length, e.to_depth);
+        const W depth = quantise(quantise(entry_blend(e, at, EntryLookup::extinction), e.to_depth) * length,
+                                 e.to_shorter);
         slab.alpha = select(shorter, opacity_of_depth(e.opacity, depth), slab.alpha);
     }
     if (e.has_opaque) slab.alpha = select(is_opaque(e, at), constant<W>(e.one_alpha), slab.alpha);

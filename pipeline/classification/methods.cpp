@@ -11,6 +11,9 @@ ClassificationMethod build_method(const ClassificationInputs& inputs) {
         case Method::pc:
         case Method::pc_mid:
             return build_post_classification(inputs);
+        case Method::pips:
+            if (inputs.settings.order == 1) return build_power_series_of_order_1(inputs);
+            break;
         default:
             break;
     }

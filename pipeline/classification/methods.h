@@ -11,6 +11,7 @@
 // and, for every word, classify(const M&, front, back, length) -> Slab.
 // Included once per SIMD target, so that each method's own file is.
 #include "pipeline/classification/pc.h"
+#include "pipeline/classification/pips.h"
 
 #ifndef SQUINT_PIPELINE_CLASSIFICATION_METHODS_H
 #define SQUINT_PIPELINE_CLASSIFICATION_METHODS_H
@@ -19,7 +20,7 @@
 
 namespace squint {
 
-using ClassificationMethod = std::variant<PostClassification>;
+using ClassificationMethod = std::variant<PostClassification, PowerSeriesOfOrder1>;
 
 /// The method that the settings name, with its tables built.  Throws InputError for orders and formats it
 /// cannot have.

@@ -16,13 +16,14 @@ using namespace squint::HWY_NAMESPACE;
 
 constexpr int kSide = 4;  // a packet is 4x4 pixels
 
-int bits_of(const WordNeeds& needs, int most_operand_bits) {
-    if (needs.operand_bits > most_operand_bits) return 0;
-    return needs.result_bits <= 32 ? 32 : needs.result_bits <= 64 ? 64 : 0;
+// Bits of the lanes that hold a stage; 0 where none does.
+int bits_of(const WordNeeds& needs) {
+    if (needs.operand_bits > 32) return 0;
+    return needs.lane_bits <= 32 ? 32 : needs.lane_bits <= 64 ? 64 : 0;
 }
 
 StageWidths widths_of(const Plan& plan) {
-    const auto bits = [&](std::size_t stage) { return bits_of(plan.stages[stage].needs, 32); };
+    const auto bits = [&](std::size_t stage) { return bits_of(plan.stages[stage].needs); };
     return {bits(0), bits(1), bits(3), 64, bits(5)};
 }
 
@@ -157,10 +158,10 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
         return "gradients from samples run in the model";
     if (plan.volume->dims.x < 2) return "the volume is one voxel thick along x";
     for (std::size_t i = 0; i < plan.stages.size(); ++i)
-        if (plan.stages[i].modelled && bits_of(plan.stages[i].needs, 32) == 0)
+        if (plan.stages[i].modelled && bits_of(plan.stages[i].needs) == 0)
             return fmt::format("{}: factors of {} bits and results of {} fit no lane (32 and 64)",
                                plan.stages[i].name, plan.stages[i].needs.operand_bits,
-                               plan.stages[i].needs.result_bits);
+                               plan.stages[i].needs.lane_bits);
     for (const Wire wire : {Wire::location, Wire::direction, Wire::weight, Wire::length,
                             Wire::classification_input, Wire::slab_ratio, Wire::slab_color, Wire::slab_alpha,
                             Wire::lit_color, Wire::color, Wire::transparency, Wire::light}) {

@@ -1,0 +1,65 @@
+// Stage 4, PIPS(1): pre-integration by the first-order power series (Lee & Shin 2013, equations 8 and 22).
+// inputs at both ends (I.F) -> straight colour K (1.F), opacity (1.F):
+//
+//     x = length (T(s_b) - T(s_f)) / |s_b - s_f|     alpha = 1 - exp(-x)     K = (X(s_b) - X(s_f)) / (T(s_b)
+//     - T(s_f))
+//
+// Exact in alpha.  K is the mean colour weighted by extinction: it cannot tell front from back, and errs by
+// x^2 dc / 8 for a colour that changes by dc inside the slab.
+#ifndef SQUINT_PIPELINE_CLASSIFICATION_PIPS_H
+#define SQUINT_PIPELINE_CLASSIFICATION_PIPS_H
+
+#include "pipeline/classification/prefix.h"
+
+namespace squint {
+
+struct PowerSeriesOfOrder1 {
+    static constexpr bool kPremultiplied = false;
+    static constexpr bool kNeedsBack = true;
+    PrefixLookup prefix;
+    Table moment;     // three columns: X[i], colour over depth
+    Rescale to_part;  // the part of X inside an entry
+    Rescale to_ratio;
+    std::int64_t one_ratio = 0;
+
+    template <class V>
+    void visit(V&& v) {
+        prefix.visit(v), v(moment), v(to_part), v(to_ratio);
+    }
+    const EntryLookup& entries() const { return prefix.entries; }
+};
+PowerSeriesOfOrder1 build_power_series_of_order_1(const ClassificationInputs& inputs);
+
+}  // namespace squint
+#endif
+
+#include "pipeline/classification/prefix.h"
+
+#include <hwy/highway.h>
+#if defined(SQUINT_PIPELINE_CLASSIFICATION_PIPS_TARGET) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_PIPELINE_CLASSIFICATION_PIPS_TARGET
+#undef SQUINT_PIPELINE_CLASSIFICATION_PIPS_TARGET
+#else
+#define SQUINT_PIPELINE_CLASSIFICATION_PIPS_TARGET
+#endif
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+
+template <class W>
+HWY_INLINE Slab<W> classify(const PowerSeriesOfOrder1& m, W front, W back, W length) {
+    const CutSlab<W> cut = cut_at_wall(m.prefix, front, back);
+    const SlabDepth<W> d = slab_depth(m.prefix, cut, length);
+    const W some = max(d.difference, constant<W>(1)), one = constant<W>(m.one_ratio);
+    Slab<W> slab;
+    slab.alpha = opacity_of_depth(m.prefix.entries.opacity, d.depth);
+    for (int c = 0; c < 3; ++c) {
+        const W colored = absolute(prefix_at(m.moment, cut.end, c, m.to_part) -
+                                   prefix_at(m.moment, cut.front, c, m.to_part));
+        slab.color[static_cast<std::size_t>(c)] = min(quotient(min(colored, some), some, m.to_ratio), one);
+    }
+    return finish_straight(m.prefix, cut, front, length, slab);
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif

@@ -1,0 +1,129 @@
+// What the pre-integrated methods share: the prefix sum T of the entries' optical depths, and opaque
+// prediction. Lee & Shin, equation 8 and section 4.2, as corrected (docs/classification.md).
+#ifndef SQUINT_PIPELINE_CLASSIFICATION_PREFIX_H
+#define SQUINT_PIPELINE_CLASSIFICATION_PREFIX_H
+
+#include "pipeline/classification/entries.h"
+
+namespace squint {
+
+/// T at every entry, for one full step a unit of the coordinate, and the nearest opaque entries.
+struct PrefixLookup {
+    EntryLookup entries;
+    Table depth;         // one column: T[i]; straight between entries
+    Rescale to_part;     // the part of T inside an entry
+    Rescale to_depth;    // slab's depth: (T(b) - T(f)) / |s_b - s_f|
+    Rescale to_shorter;  // times the slab's length
+    Rescale to_wall;     // colour in front of a wall over the wall's
+    bool predicts = false;
+    Table walls;  // up, down: the nearest opaque entry at or above, at or below; absent where none is opaque
+
+    template <class V>
+    void visit(V&& v) {
+        entries.visit(v), v(depth), v(to_part), v(to_depth), v(to_shorter), v(to_wall), v(walls);
+    }
+};
+
+PrefixLookup build_prefix_lookup(const ClassificationInputs& inputs);
+
+}  // namespace squint
+#endif
+
+#include "pipeline/classification/entries.h"
+
+#include <hwy/highway.h>
+#if defined(SQUINT_PIPELINE_CLASSIFICATION_PREFIX_TARGET) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_PIPELINE_CLASSIFICATION_PREFIX_TARGET
+#undef SQUINT_PIPELINE_CLASSIFICATION_PREFIX_TARGET
+#else
+#define SQUINT_PIPELINE_CLASSIFICATION_PREFIX_TARGET
+#endif
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+
+/// A prefix sum at a position: P[i] + q(f (P[i+1] - P[i])).
+template <class W>
+HWY_INLINE W prefix_at(const Table& table, const EntryPosition<W>& at, int column, const Rescale& to_part) {
+    const W here = gather(table, at.entry, column);
+    return here + quantise(at.fraction * (gather(table, at.entry + constant<W>(1), column) - here), to_part);
+}
+
+/// A slab cut where it first meets an opaque entry: in either direction, both ends included.
+template <class W>
+struct CutSlab {
+    EntryPosition<W> front, end;  // the translucent part
+    W span;                       // |s_b - s_f| of the whole slab: the rate is kept
+    W wall;                       // 1 where an opaque entry ends it
+    W wall_entry;
+};
+template <class W>
+HWY_INLINE CutSlab<W> cut_at_wall(const PrefixLookup& p, W front, W back) {
+    const int bits = p.entries.input_fraction;
+    const W zero = constant<W>(0), one = constant<W>(1);
+    CutSlab<W> cut{entry_position(p.entries, front), {}, absolute(back - front), zero, zero};
+    W end = back;
+    if (p.predicts) {
+        const auto ascending = front < back;
+        const W above = floor_shift(front + constant<W>((std::int64_t{1} << bits) - 1), bits);
+        const W wall =
+            select(ascending, gather(p.walls, above, 0), gather(p.walls, floor_shift(front, bits), 1));
+        const W place = shift_left(wall, bits);
+        const auto hit = (ascending & (!(back < place))) | ((!ascending) & (!(place < back)));
+        end = select(hit, place, back);
+        cut.wall = select(hit, one, zero);
+        cut.wall_entry = select(hit, wall, zero);
+    }
+    cut.end = entry_position(p.entries, end);
+    return cut;
+}
+
+/// The optical depth of a cut slab, and T's difference that it comes from.
+template <class W>
+struct SlabDepth {
+    W difference;  // |T(end) - T(front)|
+    W depth;       // times length over span
+};
+template <class W>
+HWY_INLINE SlabDepth<W> slab_depth(const PrefixLookup& p, const CutSlab<W>& cut, W length) {
+    SlabDepth<W> d;
+    d.difference =
+        absolute(prefix_at(p.depth, cut.end, 0, p.to_part) - prefix_at(p.depth, cut.front, 0, p.to_part));
+    d.depth = quotient(d.difference, max(cut.span, constant<W>(1)), p.to_depth);
+    const auto shorter = length < constant<W>(std::int64_t{1} << p.entries.length_fraction);
+    if (any(shorter)) d.depth = select(shorter, quantise(d.depth * length, p.to_shorter), d.depth);
+    return d;
+}
+
+/// The last word on a slab: where its ends are equal it is the point itself; behind a wall nothing is seen.
+/// `part` is straight.
+template <class W>
+HWY_INLINE Slab<W> finish_straight(const PrefixLookup& p, const CutSlab<W>& cut, W front, W length,
+                                   Slab<W> part) {
+    if (p.predicts) {
+        const auto wall = constant<W>(0) < cut.wall;
+        if (any(wall)) {
+            for (int c = 0; c < 3; ++c) {
+                W& color = part.color[static_cast<std::size_t>(c)];
+                const W behind =
+                    quantise(shift_left(gather(p.entries.table, cut.wall_entry, c), p.entries.input_fraction),
+                             p.entries.to_color);
+                color = select(
+                    wall, quantise(blend(behind, color, part.alpha, p.entries.alpha_fraction), p.to_wall),
+                    color);
+            }
+            part.alpha = select(wall, constant<W>(p.entries.one_alpha), part.alpha);
+        }
+    }
+    auto point = cut.span == constant<W>(0);
+    if (p.predicts) point = point | is_opaque(p.entries, cut.front);
+    if (any(point)) {
+        const Slab<W> here = classify_point(p.entries, front, length);
+        for (std::size_t c = 0; c < 3; ++c) part.color[c] = select(point, here.color[c], part.color[c]);
+        part.alpha = select(point, here.alpha, part.alpha);
+    }
+    return part;
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif
