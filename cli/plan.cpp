@@ -132,7 +132,7 @@ int run(const PlanArguments& a) {
                         text_of_bytes(memory.tables), text_of_bytes(memory.image));
     text += plan.real ? "model: double\n" : fmt::format("model: {}-bit integers\n", plan.word_bits);
     text += plan.skips_empty_space
-                ? "empty space: may be left out\n"
+                ? "empty space: skipped where it can be\n"
                 : "empty space: visited, since a transparent sample is not the identity here\n";
     for (const std::string& note : plan.notes) text += "note: " + note + "\n";
     for (const std::string& warning : plan.warnings) text += "warning: " + warning + "\n";

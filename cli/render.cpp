@@ -3,6 +3,7 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "pipeline/record.h"
+#include "pipeline/reference.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -140,17 +141,24 @@ Json render_frame(const Job& job, int frame) {
     const RenderStatistics nothing;
     refuse_beyond(a.max_memory, memory_of(plan, nothing).total(), "the scene");
 
-    ProgressBar bar(!a.quiet);
+    std::optional<ProgressBar> bar(std::in_place, !a.quiet);
     RenderOptions options = a.options;
     options.cancelled = &interrupted;
-    options.progress = [&](double part) { bar(part); };
+    options.progress = [&](double part) { (*bar)(part); };
     Rendering rendering;
     Errors errors;
     {
         const Interruptible here;
         rendering = render(plan, options);
         options.progress = nullptr;
+        bar.reset();
         if (a.error) errors = rounding_errors(plan, rendering.image, options, frame);
+        if (a.reference) {
+            ProgressBar second(!a.quiet);
+            ReferenceOptions exact{.threads = options.threads, .cancelled = &interrupted};
+            exact.progress = [&](double part) { second(part); };
+            errors.against_reference = compare_colors(rendering.image, render_reference(plan, exact));
+        }
     }
     const int frames = job.scene.camera.turntable;
     const std::string exr = frame_path(job.output, frame, frames), png = frame_path(a.preview, frame, frames);
@@ -193,7 +201,6 @@ std::string default_output(const RenderArguments& a) {
 
 int run(const RenderArguments& a) {
     if (a.scene_reference) return print(scene_reference_markdown()), kDone;
-    if (a.reference) throw InputError("--reference: this build has no reference renderer");
     const std::string output = a.output.empty() ? default_output(a) : a.output;
     check_output(output, "-o", ".exr");
     check_output(a.preview, "--preview", ".png");

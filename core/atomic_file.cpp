@@ -48,7 +48,6 @@ class Temporary {
             release();
             refuse(named, error);
         }
-        slot_->live = true;
     }
     ~Temporary() {
         if (slot_->live) unlink(slot_->path);
@@ -74,8 +73,10 @@ class Temporary {
             const std::string full = (target.parent_path() / name).string();
             if (full.size() >= sizeof slot_->path) return ENAMETOOLONG;
             std::memcpy(slot_->path, full.c_str(), full.size() + 1);
+            slot_->live = true;  // before the file is there: a signal right after open() must know of it
             const int file = open(slot_->path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
             if (file >= 0) return close(file), 0;
+            slot_->live = false;
             if (errno != EEXIST) return errno;
         }
     }

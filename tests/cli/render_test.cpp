@@ -1,0 +1,262 @@
+// squint render, as a new user runs it.
+#include "core/image.h"
+#include "tests/cli/program.h"
+
+#include <gmock/gmock.h>
+#include <sys/mount.h>
+#include <unistd.h>
+
+namespace squint {
+namespace {
+
+using namespace test;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+class Render : public Program {};
+
+TEST_F(Render, WithoutASceneWritesTheBuiltInOne) {
+    const Outcome r = squint("render" + kSmall);
+    EXPECT_EQ(r.code, 0) << r.err;
+    EXPECT_EQ(r.out, "");
+    EXPECT_THAT(r.err, HasSubstr("squint.exr: 24x16 pixels"));
+    EXPECT_THAT(files(), ElementsAre("squint.exr"));
+}
+
+TEST_F(Render, WritesExrPreviewAndRecord) {
+    const Outcome r = squint("render" + kSmall + "-o a.exr --preview a.png --json a.json --quiet");
+    EXPECT_EQ(r.code, 0) << r.err;
+    EXPECT_EQ(r.out + r.err, "");
+    EXPECT_THAT(files(), ElementsAre("a.exr", "a.json", "a.png"));
+    const Image exr = read_image((folder / "a.exr").string()), png = read_image((folder / "a.png").string());
+    EXPECT_EQ(exr.width, 24);
+    EXPECT_EQ(exr.height, 16);
+    EXPECT_EQ(png.width, 24);
+    EXPECT_NE(exr.find("A"), nullptr);
+    const auto record = nlohmann::json::parse(contents(folder / "a.json"));
+    EXPECT_EQ(record["schema"], "squint.render/1");
+    EXPECT_EQ(record["scene"]["image.width"], "24");
+    EXPECT_EQ(record["pictures"][0]["hash"].get<std::string>().size(), 32u);
+}
+
+TEST_F(Render, JsonToStandardOutputIsJsonAlone) {
+    const Outcome r = squint("render" + kSmall + "--json - --audit");
+    EXPECT_EQ(r.code, 0) << r.err;
+    const auto picture = r.json()["pictures"][0];
+    for (const char* key : {"hash", "seconds", "samples", "rays", "path", "target", "threads", "memory"})
+        EXPECT_TRUE(picture.contains(key)) << key;
+    EXPECT_GT(picture["audit"]["sample"]["count"], 0);
+    EXPECT_THAT(r.err, HasSubstr("24x16 pixels"));
+    EXPECT_THAT(files(), ElementsAre());
+}
+
+TEST_F(Render, TwoRunsWriteTheSameBytesWhateverTheThreadsTilesAndPath) {
+    EXPECT_EQ(squint("render" + kSmall + "-o a.exr --preview a.png --set output.fixed=true --threads 1").code,
+              0);
+    fs::create_directory(folder / "other");
+    EXPECT_EQ(
+        shell("cd other && sleep 1.1 && \"$SQUINT\" render" + kSmall +
+              "-o b.exr --preview b.png --set output.fixed=true --threads 7 --tile 5 --path model --no-skip")
+            .code,
+        0);
+    EXPECT_EQ(contents(folder / "a.exr"), contents(folder / "other/b.exr"));
+    EXPECT_EQ(contents(folder / "a.png"), contents(folder / "other/b.png"));
+}
+
+TEST_F(Render, TheExrHoldsTheResolvedSceneTheFormatsAndTheVersionAndNoFolder) {
+    ASSERT_EQ(squint("volume sphere --dims 16 -o ball.nrrd").code, 0);
+    const Outcome r = squint(
+        "render --size 8x8 --set volume.file=\"$PWD/ball.nrrd\" --set 'precision.sample=u12.3 trn' "
+        "--threads 1 -o a.exr -q");
+    ASSERT_EQ(r.code, 0) << r.err;
+    Attributes attributes;
+    read_image((folder / "a.exr").string(), &attributes);
+    EXPECT_EQ(attributes["squint.image.width"], "8");
+    EXPECT_EQ(attributes["squint.volume.file"], "\"ball.nrrd\"");
+    EXPECT_EQ(attributes["squint.wire.sample"], "u12.3 trn sat");
+    EXPECT_THAT(attributes["squint.version"], HasSubstr("."));
+    EXPECT_EQ(attributes["squint.volume.hash"].size(), 32u);
+    for (const auto& [name, value] : attributes) {
+        EXPECT_EQ(value.find(folder.string()), std::string::npos) << name;
+        EXPECT_EQ(name.find("thread"), std::string::npos) << name;
+    }
+}
+
+TEST_F(Render, TheValueGivenLastWins) {
+    write("s.toml", "[image]\nwidth = 10\n");
+    const auto width = [&](const std::string& flags) {
+        const Outcome r = squint(
+            "render s.toml --set volume.dims=8 --set volume.procedural=phantom "
+            "--set transfer_function.preset=phantom --json - -q " +
+            flags);
+        EXPECT_EQ(r.code, 0) << r.err;
+        return r.json()["scene"]["image.width"].get<std::string>();
+    };
+    EXPECT_EQ(width("--set image.height=4"), "10");
+    EXPECT_EQ(width("--set image.width=11 --size 12x4"), "12");
+    EXPECT_EQ(width("--size 12x4 --set image.width=11"), "11");
+}
+
+TEST_F(Render, ATurntableNumbersItsPictures) {
+    const Outcome r =
+        squint("render" + kSmall + "--set camera.turntable=3 -o t.exr --preview p.png --json -");
+    EXPECT_EQ(r.code, 0) << r.err;
+    EXPECT_THAT(files(), ElementsAre("p.0000.png", "p.0001.png", "p.0002.png", "t.0000.exr", "t.0001.exr",
+                                     "t.0002.exr"));
+    const auto pictures = r.json()["pictures"];
+    ASSERT_EQ(pictures.size(), 3u);
+    EXPECT_NE(pictures[0]["hash"], pictures[1]["hash"]);
+}
+
+TEST_F(Render, ErrorIsReportedAndAttributedToStages) {
+    const Outcome r = squint("render" + kSmall + "--set precision.preset=eight_bit --error --json -");
+    ASSERT_EQ(r.code, 0) << r.err;
+    const auto error = r.json()["pictures"][0]["error"];
+    EXPECT_GT(error["against_real"]["foreground"]["RGB"]["psnr"], 10);
+    EXPECT_EQ(error["stages"].size(), 6u);
+    // Rounding one stage alone is not the whole: each differs from it, and none is free at eight bits.
+    for (const auto& stage : error["stages"])
+        EXPECT_NE(stage["against_real"]["all"]["RGB"], error["against_real"]["all"]["RGB"]) << stage["stage"];
+    EXPECT_THAT(r.err, HasSubstr("compositing"));
+}
+
+TEST_F(Render, RealHasNoRoundingError) {
+    const Outcome r = squint("render" + kSmall + "--set precision.preset=real --error --json -");
+    ASSERT_EQ(r.code, 0) << r.err;
+    const auto rgb = r.json()["pictures"][0]["error"]["against_real"]["foreground"]["RGB"];
+    EXPECT_TRUE(rgb["identical"]);
+    EXPECT_TRUE(rgb["psnr"].is_null());
+}
+
+TEST_F(Render, ReferenceIsMeasuredToo) {
+    const Outcome r = squint("render" + kSmall + "--set sampling.step=0.25 --reference --json -");
+    ASSERT_EQ(r.code, 0) << r.err;
+    const auto error = r.json()["pictures"][0]["error"];
+    EXPECT_FALSE(error.contains("against_real"));
+    EXPECT_FALSE(error["against_reference"]["all"]["RGB"]["identical"]);
+}
+
+TEST_F(Render, AuditPrintsATableOfWires) {
+    const Outcome r = squint("render" + kSmall + "--audit -q");
+    EXPECT_EQ(r.code, 0) << r.err;
+    EXPECT_THAT(r.out, HasSubstr("saturated"));
+    EXPECT_THAT(r.out, HasSubstr("transparency"));
+    EXPECT_EQ(r.err, "");
+}
+
+TEST_F(Render, AuditDoesNotChangeThePicture) {
+    const auto hash = [&](const char* flags) {
+        return squint("render" + kSmall + "--json - -q " + flags).json()["pictures"][0]["hash"];
+    };
+    EXPECT_EQ(hash(""), hash("--audit"));
+}
+
+TEST_F(Render, ScenesThatHaveLittleToShowWork) {
+    for (const char* flags :
+         {"--set 'lights=[]'", "--set volume.dims=[16,16,1]", "--set clip.high=[-5,-5,-5]",
+          "--set 'transfer_function.points=[[0, 1, 1, 1, 0]]' --set transfer_function.unit_distance=1",
+          "--set 'camera.eye=[5, 5, 5]' --set camera.projection=perspective"}) {
+        const Outcome r = squint("render" + kSmall + flags + " -o a.exr");
+        EXPECT_EQ(r.code, 0) << flags << ": " << r.err;
+    }
+}
+
+// ------------------------------------------------------------------------------------------------ bad input
+
+TEST_F(Render, MistakesInAFileAreNamedWithTheirPlace) {
+    write("s.toml", "[volume]\nprocedural = \"phantom\"\n[samplig]\nstep = 1\n");
+    expect_refusal(squint("render s.toml"),
+                   "s.toml:3:2: unknown setting \"samplig\"; did you mean \"sampling\"?");
+    EXPECT_THAT(files(), ElementsAre("s.toml"));
+}
+
+TEST_F(Render, MistakesOnTheCommandLineAreOneLine) {
+    expect_refusal(squint("render --set sampling.stepp=1"), "did you mean \"step\"?");
+    expect_refusal(squint("render --set sampling.step"), "sampling.step");
+    expect_refusal(squint("render --set sampling.step=-1"), "sampling.step");
+    expect_refusal(squint("render --size 12"), "WIDTHxHEIGHT");
+    expect_refusal(squint("render --size 0x5"), "image.width");
+    expect_refusal(squint("render --frobnicate"), "see squint render --help");
+    expect_refusal(squint("render --threads 0"), "--threads");
+    expect_refusal(squint("render --path fastest"), "--path");
+    expect_refusal(squint("render --max-memory lots"), "500M");
+    expect_refusal(squint("render --target SSE9000" + kSmall), "SSE9000");
+    expect_refusal(squint("render nothing.toml"), "nothing.toml");
+    expect_refusal(squint("render --set volume.file=nothing.nrrd"), "nothing.nrrd");
+    expect_refusal(squint("render --set 'volume.file=${SQUINT_UNSET_VARIABLE}/a.nrrd'"),
+                   "SQUINT_UNSET_VARIABLE");
+    expect_refusal(squint("render --set precision.sample=u3.8" + kSmall), "sample");
+    EXPECT_THAT(files(), ElementsAre());
+}
+
+TEST_F(Render, OutputsThatCannotBeAreRefusedBeforeTheWork) {
+    const std::string slow = "render --size 4000x4000 --set sampling.step=0.01 ";
+    expect_refusal(squint(slow + "-o no/such/a.exr"), "no folder no/such");
+    expect_refusal(squint(slow + "-o a.png"), ".exr");
+    expect_refusal(squint(slow + "--preview a.exr"), ".png");
+    fs::create_directory(folder / "locked");
+    fs::permissions(folder / "locked", fs::perms::owner_read | fs::perms::owner_exec);
+    if (geteuid() != 0) expect_refusal(squint(slow + "-o locked/a.exr"), "Permission denied");
+    fs::permissions(folder / "locked", fs::perms::owner_all);
+}
+
+TEST_F(Render, RefusesMoreMemoryThanAllowed) {
+    expect_refusal(squint("render --size 8000x8000 --max-memory 100M"),
+                   "--max-memory: a picture of 8000x8000 pixels");
+    expect_refusal(squint("render --size 8x8 --max-memory 1M"), "phantom");
+    EXPECT_EQ(squint("render" + kSmall + "--max-memory 10M").code, 0);
+}
+
+TEST_F(Render, AFullDiskLeavesNothing) {
+    if (geteuid() != 0) GTEST_SKIP() << "needs root, to mount a small disk";
+    const fs::path disk = folder / "disk";
+    fs::create_directory(disk);
+    if (mount("none", disk.c_str(), "tmpfs", 0, "size=4k") != 0)
+        GTEST_SKIP() << "cannot mount a small disk here";
+    const std::string large = "render --size 128x128 --set volume.dims=16 --set camera.height=16 ";
+    expect_refusal(squint(large + "-o disk/a.exr -q"), "disk/a.exr");
+    expect_refusal(squint("volume sphere --dims 32 -o disk/a.nrrd"), "disk/a.nrrd");
+    EXPECT_TRUE(fs::is_empty(disk));
+    umount(disk.c_str());
+}
+
+TEST_F(Render, StandardOutputThatCannotBeWrittenIsAnError) {
+    if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
+    const Outcome r = shell("\"$SQUINT\" plan" + kSmall + ">/dev/full");
+    EXPECT_EQ(r.code, 2);
+    EXPECT_THAT(r.err, HasSubstr("squint: standard output"));
+}
+
+// ------------------------------------------------------------------------------------------------
+// interruption
+
+// sh starts background jobs with SIGINT ignored, and the program respects that: so `timeout` sends it.
+TEST_F(Render, CtrlCEndsWith130AndLeavesNothing) {
+    for (const char* signal : {"INT", "TERM"}) {
+        const Outcome r =
+            shell(std::string("timeout --preserve-status --signal=") + signal +
+                  " 1 \"$SQUINT\" render --size 4000x4000 --set sampling.step=0.02 --path model "
+                  "-o a.exr --preview a.png --json a.json");
+        EXPECT_EQ(r.code, 130) << signal << r.err;
+        EXPECT_EQ(r.err, "squint: interrupted\n");
+        EXPECT_THAT(files(), ElementsAre());
+    }
+}
+
+TEST_F(Render, CtrlCAtAnyMomentLeavesNothingHalfWritten) {
+    // From set-up to the last file: what is there is whole.
+    for (const char* delay : {"0.02", "0.05", "0.1", "0.15", "0.2", "0.3"}) {
+        const Outcome r =
+            shell(std::string("timeout --preserve-status --signal=INT ") + delay +
+                  " \"$SQUINT\" render --size 300x300 --set volume.dims=16 -q -o a.exr --preview a.png");
+        EXPECT_TRUE(r.code == 130 || r.code == 0) << r.code << r.err;
+        for (const std::string& name : files()) {
+            EXPECT_TRUE(name == "a.exr" || name == "a.png") << name;
+            EXPECT_EQ(read_image((folder / name).string()).width, 300);
+            fs::remove(folder / name);
+        }
+    }
+}
+
+}  // namespace
+}  // namespace squint

@@ -1,0 +1,225 @@
+// Every verb but render, as a new user runs it.
+#include "core/image.h"
+#include "tests/cli/program.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+namespace squint {
+namespace {
+
+using namespace test;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class Verbs : public Program {};
+
+TEST_F(Verbs, EachHasHelpWithAnExample) {
+    const Outcome all = squint("--help");
+    EXPECT_EQ(all.code, 0);
+    EXPECT_EQ(all.err, "");
+    for (const char* verb : {"render", "plan", "pixel", "number", "compare", "info", "volume", "doctor"}) {
+        EXPECT_THAT(all.out, HasSubstr(verb));
+        const Outcome help = squint(std::string(verb) + " --help");
+        EXPECT_EQ(help.code, 0);
+        EXPECT_THAT(help.out, HasSubstr("Example")) << verb;
+        EXPECT_THAT(help.out, HasSubstr(std::string("  squint ") + verb)) << verb;
+        EXPECT_EQ(squint(std::string("help ") + verb).out, help.out);
+    }
+}
+
+TEST_F(Verbs, UsageErrorsExitWith2) {
+    expect_refusal(squint(""), "squint help");
+    expect_refusal(squint("rendr"), "rendr");
+    expect_refusal(squint("help rendr"), "rendr");
+    expect_refusal(squint("compare a.exr"), "see squint compare --help");
+    expect_refusal(squint("plan --json=yes=no"), "plan");
+}
+
+TEST_F(Verbs, VersionIsOneLine) {
+    const Outcome r = squint("--version");
+    EXPECT_EQ(r.code, 0);
+    EXPECT_TRUE(r.out.starts_with("squint 0.")) << r.out;
+}
+
+TEST_F(Verbs, PlanSaysWhatIsLeftOutAndWhy) {
+    const Outcome lit = squint("plan" + kSmall), unlit = squint("plan --set 'lights=[]'" + kSmall);
+    EXPECT_EQ(lit.code, 0) << lit.err;
+    EXPECT_THAT(lit.out, HasSubstr("classification_input"));
+    EXPECT_THAT(lit.out, HasSubstr("memory"));
+    EXPECT_THAT(lit.out, Not(HasSubstr("left out")));
+    EXPECT_THAT(unlit.out, HasSubstr("left out"));
+    EXPECT_THAT(unlit.out, HasSubstr("the scene has no light"));
+    EXPECT_THAT(unlit.out, Not(HasSubstr("normalised gradient")));
+}
+
+TEST_F(Verbs, PlanAsJsonNamesEveryWireWithItsFormat) {
+    const auto plan = squint("plan --json --set 'precision.color=u1.9 trn'" + kSmall).json();
+    EXPECT_EQ(plan["schema"], "squint.plan/1");
+    EXPECT_EQ(plan["stages"].size(), 6u);
+    EXPECT_EQ(plan["wires"]["color"]["format"], "u1.9");
+    EXPECT_EQ(plan["wires"]["color"]["rounding"], "trn");
+    EXPECT_GT(plan["memory"]["table_bytes"], 0);
+}
+
+TEST_F(Verbs, PixelShowsTheWiresThatLeadToThePicture) {
+    const Outcome r = squint("pixel 12 8 --json" + kSmall);
+    ASSERT_EQ(r.code, 0) << r.err;
+    const auto trace = r.json();
+    // The last T on its wire is the picture's: A = 1 - T.
+    double transparency = -1;
+    for (const auto& event : trace["events"])
+        if (event["wire"] == "transparency") transparency = event["value"];
+    EXPECT_EQ(trace["color"][3], 1 - transparency);
+    ASSERT_EQ(squint("render" + kSmall + "-o a.exr -q").code, 0);
+    const Image image = read_image((folder / "a.exr").string());
+    EXPECT_EQ(image.find("A")->values[8 * 24 + 12], trace["color"][3]);
+    EXPECT_EQ(image.find("R")->values[8 * 24 + 12], static_cast<float>(trace["color"][0].get<double>()));
+}
+
+TEST_F(Verbs, PixelPrintsTheSamplesAskedFor) {
+    write("s.toml",
+          "[volume]\nprocedural = \"fog\"\ndims = 16\n[image]\nwidth = 24\nheight = 16\n[transfer_function]\n"
+          "unit_distance = 1.0\npoints = [[0, 1, 1, 1, 0.1]]\n");
+    const Outcome r = squint("pixel s.toml 12 8 --samples 2:3");
+    ASSERT_EQ(r.code, 0) << r.err;
+    EXPECT_THAT(r.out, HasSubstr("\n2 "));
+    EXPECT_THAT(r.out, HasSubstr("\n3 "));
+    EXPECT_THAT(r.out, Not(HasSubstr("\n4 ")));
+    EXPECT_THAT(r.out, HasSubstr("classification_input"));
+}
+
+TEST_F(Verbs, PixelRefusesWhatIsOutsideThePicture) {
+    expect_refusal(squint("pixel 24 0" + kSmall),
+                   "24 0 is outside the picture; allowed: 0 to 23 and 0 to 15");
+    expect_refusal(squint("pixel 1" + kSmall), "X Y");
+    expect_refusal(squint("pixel a b" + kSmall), "column");
+    expect_refusal(squint("pixel 1 1 --samples 5:2" + kSmall), "FIRST:LAST");
+}
+
+TEST_F(Verbs, NumberConvertsAndCalculates) {
+    const Outcome r = squint("number u1.15 0.7");
+    EXPECT_EQ(r.code, 0) << r.err;
+    for (const char* part : {"22938", "0x599a", "0.101100110011010", "0.70001220703125", "inexact"})
+        EXPECT_THAT(r.out, HasSubstr(part));
+    EXPECT_THAT(squint("number 'u1.15 trn' mul u1.15 0.7 u1.15 0.7").out, HasSubstr("raw     16056\n"));
+    EXPECT_THAT(squint("number s1.2 -0.5").out, HasSubstr("raw     -2\n"));
+    expect_refusal(squint("number u1.15 mul 0.7"), "mul: 1 operands, but it takes 2");
+    expect_refusal(squint("number u99.15 1"), "'u99.15' is not a format");
+}
+
+TEST_F(Verbs, NumberAnswersALineForEachOfStandardInput) {
+    const Outcome r =
+        shell("printf 'u1.15 0.7\\n\\nu0.8 mul #128 0x80 // a comment\\n' | \"$SQUINT\" number");
+    EXPECT_EQ(r.code, 0) << r.err;
+    EXPECT_EQ(
+        r.out,
+        "22938 0x599a 0.101100110011010 0.70001220703125 +1.2207e-05 inexact\n64 0x40 .01000000 0.25 0 -\n");
+    const Outcome wrong = shell("printf 'u1.15 0.7\\nu1.15 zero\\n' | \"$SQUINT\" number");
+    EXPECT_EQ(wrong.code, 2);
+    EXPECT_THAT(wrong.err, HasSubstr("squint: standard input:2: 'zero' is not a number"));
+}
+
+/// 8x8 pixels, R G B A, each of one value.
+Image flat(float value) {
+    Image image{8, 8, {}};
+    for (const char* name : {"R", "G", "B", "A"}) image.add_float(name).values.assign(64, value);
+    return image;
+}
+
+TEST_F(Verbs, CompareMeasuresAndJudges) {
+    Image a = flat(0.5f), b = flat(0.5f);
+    b.find("G")->values[10] += 0.25f;  // column 2, row 1
+    write_exr(a, (folder / "a.exr").string(), {});
+    write_exr(b, (folder / "b.exr").string(), {});
+    EXPECT_EQ(squint("compare a.exr a.exr --fail-above 0 --min-psnr 100").code, 0);
+    const Outcome r = squint("compare a.exr b.exr --json");
+    EXPECT_EQ(r.code, 0) << r.err;
+    const auto green = r.json()["channels"]["all"]["G"];
+    // One of 64 pixels is off by 1/4: PSNR = 10 log10(64 * 16).
+    EXPECT_NEAR(green["psnr"].get<double>(), 10 * std::log10(1024.0), 1e-9);
+    EXPECT_EQ(green["max_error_at"], nlohmann::json({2, 1}));
+    EXPECT_EQ(green["max_error_lsb8"], 63.75);
+    EXPECT_TRUE(r.json()["channels"]["all"]["R"]["identical"]);
+
+    const Outcome bounded = squint("compare a.exr b.exr --fail-above 63");
+    EXPECT_EQ(bounded.code, 1);
+    EXPECT_EQ(bounded.err, "squint: compare: G: error of 63.75 LSB8 at 2 1, allowed: 63\n");
+    EXPECT_THAT(bounded.out, HasSubstr("30.10"));
+    EXPECT_EQ(squint("compare a.exr b.exr --fail-above 64").code, 0);
+    EXPECT_EQ(squint("compare a.exr b.exr --min-psnr 31").code, 1);
+    EXPECT_EQ(squint("compare a.exr b.exr --min-psnr 30").code, 0);
+}
+
+TEST_F(Verbs, CompareWritesTheDifference) {
+    Image a = flat(0.5f), b = flat(0.25f);
+    write_exr(a, (folder / "a.exr").string(), {});
+    write_exr(b, (folder / "b.exr").string(), {});
+    EXPECT_EQ(squint("compare b.exr a.exr --diff d.exr --gain 2").code, 0);
+    EXPECT_EQ(read_image((folder / "d.exr").string()).find("R")->values[0], -0.5f);
+    EXPECT_EQ(squint("compare b.exr a.exr --diff d.png").code, 0);
+    EXPECT_GT(read_image((folder / "d.png").string()).find("R")->values[0], 0);
+    expect_refusal(squint("compare b.exr a.exr --diff d.txt"), ".exr or .png");
+}
+
+TEST_F(Verbs, CompareNeverPassesWhatCannotBeCompared) {
+    Image a = flat(0.5f), nan = flat(NAN), wide = flat(0.5f), more = flat(0.5f);
+    more.add_float("Z");
+    wide.width = 16, wide.height = 4;
+    write_exr(a, (folder / "a.exr").string(), {});
+    write_exr(nan, (folder / "nan.exr").string(), {});
+    write_exr(wide, (folder / "wide.exr").string(), {});
+    write_exr(more, (folder / "more.exr").string(), {});
+    for (const char* other : {"nan.exr", "wide.exr", "more.exr"}) {
+        const Outcome r = squint(std::string("compare a.exr ") + other);
+        EXPECT_EQ(r.code, 1) << other;
+        EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+    }
+    EXPECT_EQ(squint("compare nan.exr nan.exr").code, 1);
+    expect_refusal(squint("compare a.exr absent.exr"), "absent.exr");
+}
+
+TEST_F(Verbs, VolumeWritesWhatInfoReads) {
+    const Outcome w = squint("volume ramp --dims 8x9x10 --bits 8 -o r.nrrd");
+    EXPECT_EQ(w.code, 0) << w.err;
+    EXPECT_EQ(w.out, "");
+    const Outcome r = squint("info r.nrrd");
+    EXPECT_EQ(r.code, 0) << r.err;
+    EXPECT_THAT(r.out, HasSubstr("8 x 9 x 10 = 720 voxels"));
+    EXPECT_THAT(r.out, HasSubstr("histogram"));
+    const auto info = squint("info r.nrrd --json").json();
+    EXPECT_EQ(info["hash"],
+              squint("info ramp --set volume.dims=[8,9,10] --set volume.bits=8 --json").json()["hash"]);
+    std::int64_t voxels = 0;
+    for (const auto& count : info["histogram"]["counts"]) voxels += count.get<std::int64_t>();
+    EXPECT_EQ(voxels, 720);
+    expect_refusal(squint("volume ramp -o r.vtk"), ".nrrd");
+    expect_refusal(squint("volume nonsense -o n.nrrd"), "nonsense");
+}
+
+TEST_F(Verbs, InfoReadsRawFilesAsDescribed) {
+    write("v.raw", std::string("\x01\x00\x02\x00\x03\x00\x04\x00\x05\x00\x06\x00\x07\x00\x08\x00", 16));
+    const auto info = squint("info v.raw --json --set volume.dims=2 --set volume.type=u16").json();
+    EXPECT_EQ(info["scalar_range"], nlohmann::json({1, 8}));
+    expect_refusal(squint("info v.raw --set volume.dims=3 --set volume.type=u16"), "needs 54");
+    expect_refusal(squint("info v.raw"), "v.raw");
+}
+
+TEST_F(Verbs, DoctorFindsThisInstallationWell) {
+    const Outcome r = squint("doctor");
+    EXPECT_EQ(r.code, 0) << r.out;
+    for (const char* part : {"OpenImageIO", "Highway", "TBB", "teem", "SIMD targets", "as expected"})
+        EXPECT_THAT(r.out, HasSubstr(part));
+}
+
+TEST_F(Verbs, SceneReferencePrintsEveryKey) {
+    const Outcome r = squint("render --scene-reference");
+    EXPECT_EQ(r.code, 0);
+    EXPECT_THAT(r.out, HasSubstr("classification"));
+    EXPECT_EQ(r.out, contents(SQUINT_SOURCE_DIR "/docs/scene.md"));
+}
+
+}  // namespace
+}  // namespace squint
