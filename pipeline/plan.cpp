@@ -87,6 +87,11 @@ void require_signed(const Plan& plan, Wire wire) {
                         plan.specs[wire].format.integer_bits, plan.specs[wire].format.fraction_bits));
 }
 
+CompositingForm form_of(const Scene& scene) {
+    const CompositingForm form = scene.compositing.form;
+    return form == CompositingForm::automatic ? preset_form(resolved_precision(scene).preset) : form;
+}
+
 void check_formats(const Plan& plan) {
     const Volume& v = *plan.volume;
     const auto longest = static_cast<double>(std::max({v.dims.x, v.dims.y, v.dims.z})) - 1;
@@ -102,8 +107,8 @@ void check_formats(const Plan& plan) {
     require_integer_bits(
         plan, Wire::classification_input, bits_for(plan.entries.coordinate(v.largest)),
         fmt::format("entry {} of the transfer function", plan.entries.coordinate(v.largest)));
-    if (plan.scene.compositing.form != CompositingForm::unit255_blinn &&
-        plan.scene.compositing.form != CompositingForm::unit255_shift)
+    if (form_of(plan.scene) != CompositingForm::unit255_blinn &&
+        form_of(plan.scene) != CompositingForm::unit255_shift)
         require_integer_bits(plan, Wire::transparency, 1, "a transparency of 1.0");
     if (plan.lit)
         for (const Wire wire : {Wire::gradient_lerp, Wire::gradient, Wire::normal, Wire::light, Wire::dot})
@@ -285,7 +290,7 @@ void plan_shading(Plan& plan) {
 
 void plan_compositing(Plan& plan) {
     CompositingStage& s = plan.compositing;
-    s.form = plan.scene.compositing.form;
+    s.form = form_of(plan.scene);
     s.premultiplied = plan.shading.premultiplied;
     s.alpha_fraction = fraction(plan, Wire::slab_alpha);
     const int unlit = s.premultiplied ? fraction(plan, Wire::slab_color) : fraction(plan, Wire::slab_ratio);

@@ -59,18 +59,21 @@ WireSpecs eight_bit(const PresetInputs& in) {
 // leave the middle levels 19 - I bits.
 WireSpecs standard(const PresetInputs& in) {
     constexpr Rounding r = Rounding::rnd_conv;
+    // Halves are rare in interpolation, and rounding them up costs two instructions where rounding to even
+    // costs five.
+    constexpr Rounding up = Rounding::rnd;
     const int scalar = in.scalar_bits, weight = scalar <= 12 ? 12 : 10;
     const int level = 31 - scalar - weight;  // fraction bits of a middle level: I + level + weight <= 31
     const int gradient = 18 - scalar;
     WireSpecs w{};
-    w[Wire::location] = u(in.location_bits, clip(31 - in.location_bits), r);
+    w[Wire::location] = u(in.location_bits, clip(31 - in.location_bits), up);
     w[Wire::direction] = s(in.direction_bits, w[Wire::location].format.fraction_bits, r);
-    w[Wire::weight] = u(1, weight, r), w[Wire::length] = u(1, 9, r);
-    w[Wire::lerp_x] = w[Wire::lerp_y] = u(scalar, level, r),
-    w[Wire::sample] = u(scalar, std::min(12, 24 - scalar), r);
-    w[Wire::gradient_lerp] = w[Wire::gradient] = s(scalar, gradient, r), w[Wire::spacing] = u(1, 12, r);
+    w[Wire::weight] = u(1, weight, up), w[Wire::length] = u(1, 9, r);
+    w[Wire::lerp_x] = w[Wire::lerp_y] = u(scalar, level, up),
+    w[Wire::sample] = u(scalar, std::min(12, 24 - scalar), up);
+    w[Wire::gradient_lerp] = w[Wire::gradient] = s(scalar, gradient, up), w[Wire::spacing] = u(1, 12, r);
     w[Wire::normal] = s(1, 15, r);
-    w[Wire::classification_input] = u(in.entry_bits, 8, r);
+    w[Wire::classification_input] = u(in.entry_bits, 8, up);
     w[Wire::table_color] = w[Wire::table_alpha] = u(1, 15, r);
     w[Wire::table_extinction] = w[Wire::table_moment] =
         u(in.total_depth_bits, std::min(20, clip(31 - in.total_depth_bits)), r);
@@ -92,7 +95,8 @@ WireSpecs wide(const PresetInputs& in) {
     w[Wire::location] = u(in.location_bits, 24, r), w[Wire::direction] = s(in.direction_bits, 24, r),
     w[Wire::weight] = u(1, 20, r);
     w[Wire::length] = u(1, 22, r);
-    w[Wire::lerp_x] = w[Wire::lerp_y] = w[Wire::sample] = u(in.scalar_bits, 20, r);
+    w[Wire::lerp_x] = w[Wire::lerp_y] = w[Wire::sample] =
+        u(in.scalar_bits, std::min(20, 30 - in.scalar_bits), r);
     w[Wire::gradient_lerp] = w[Wire::gradient] = s(in.scalar_bits, 16, r), w[Wire::spacing] = u(1, 20, r),
     w[Wire::normal] = s(1, 20, r);
     w[Wire::classification_input] = u(in.entry_bits, std::min(18, 31 - in.entry_bits), r);
@@ -120,6 +124,12 @@ bool preset_specs(std::string_view name, const PresetInputs& inputs, WireSpecs& 
     if (name == "eight_bit") return specs = eight_bit(inputs), true;
     if (name == "wide" || name == "real") return specs = wide(inputs), true;
     return false;
+}
+
+CompositingForm preset_form(std::string_view name) {
+    if (name == "squeeze") return CompositingForm::equation_9;
+    if (name == "eight_bit") return CompositingForm::unit255_shift;
+    return CompositingForm::w;
 }
 
 }  // namespace squint

@@ -1,6 +1,7 @@
 // Precision presets: a Spec for every wire (CONVENTIONS.md, "Presets"; the table is in docs/pipeline.md).
 #pragma once
 
+#include "pipeline/scene.h"
 #include "pipeline/wires.h"
 
 #include <string>
@@ -26,5 +27,8 @@ const std::vector<std::string>& preset_names();
 /// Fills `specs`; false if the name is unknown.  `real` has the formats of `wide`, which say where its raw
 /// units stand.
 bool preset_specs(std::string_view name, const PresetInputs& inputs, WireSpecs& specs);
+
+/// What a preset composites with where the scene does not say.
+CompositingForm preset_form(std::string_view name);
 
 }  // namespace squint

@@ -111,11 +111,15 @@ HWY_INLINE void shade(const ShadingStage& s, const RayWords<W>& ray, const std::
             const W light_view = dot(light, ray.view, s.to_dot);
             highlight = quantise(shift_left(facing * towards_eye, 1) - shift_left(light_view, s.dot_fraction),
                                  s.to_reflected);
-            highlight = select(facing < zero, zero, highlight);
+            // No reflection where no light falls; R is the same for both sides of a surface.
+            highlight = select(s.two_sided ? facing == zero : !(zero < facing), zero, highlight);
         } else {
             highlight = dot(normal, half, s.to_dot);
         }
-        if (s.two_sided) facing = absolute(facing), highlight = absolute(highlight);
+        if (s.two_sided) {
+            facing = absolute(facing);
+            if (s.model != ShadingModel::phong) highlight = absolute(highlight);
+        }
         facing = clamp(facing, zero, one_dot);
         highlight = power(s, clamp(highlight, zero, one_dot));
         for (std::size_t c = 0; c < channels; ++c) {
