@@ -138,6 +138,7 @@ void add_plan(CLI::App& app, PlanArguments& a) {
         "plan",
         "Say what a scene exercises: stages, wires, formats, words, tables, and what is left out and why");
     add_scene(verb, a.scene);
+    verb.add_flag("--brief", a.brief, "A line a stage: its wires and their formats");
     add_json_flag(verb, a.json);
     verb.footer("Example:\n  squint plan head.toml --set precision.preset=squeeze");
 }

@@ -27,7 +27,7 @@ struct RenderArguments {
 };
 struct PlanArguments {
     SceneArguments scene;
-    bool json = false;
+    bool json = false, brief = false;
 };
 struct PixelArguments {
     std::vector<std::string> words;  // [SCENE.toml] X Y, as given: taken apart below

@@ -34,6 +34,30 @@ std::vector<TableReport> tables_of(const Plan& plan) {
     return tables;
 }
 
+struct FindWires {
+    std::array<bool, kWires>& used;
+    void operator()(const Rescale& rescale) const {
+        if (rescale.wire >= 0) used[static_cast<std::size_t>(rescale.wire)] = true;
+    }
+    void operator()(const Table& table) const {
+        if (table.wire >= 0 && table.rows() > 0) used[static_cast<std::size_t>(table.wire)] = true;
+    }
+};
+
+/// The wires of stages that are modelled, less those that another method would need.
+std::array<bool, kWires> wires_used(const Plan& plan) {
+    std::array<bool, kWires> used{};
+    Plan visited = plan;
+    visit_stages(visited, FindWires{used});
+    // Rounded once in the set-up, by no Rescale.
+    used[static_cast<std::size_t>(Wire::spacing)] = !plan.gradient.isotropic;
+    used[static_cast<std::size_t>(Wire::material)] = true;
+    for (std::size_t w = 0; w < used.size(); ++w)
+        for (const StageReport& stage : plan.stages)
+            if (stage.name == kWireInfo[w].stage && !stage.modelled) used[w] = false;
+    return used;
+}
+
 int word_of(int bits) {
     for (const int word : {16, 32, 64})
         if (bits <= word) return word;
@@ -62,10 +86,11 @@ std::string stages_text(const Plan& plan) {
 std::string wires_text(const Plan& plan) {
     Rows rows{{"wire", "format", "rounding", "overflow", "width", "word", "meaning"}};
     std::string_view stage;
+    const auto used = wires_used(plan);
     for (int w = 0; w < kWires; ++w) {
         const WireInfo& wire = kWireInfo[static_cast<std::size_t>(w)];
         const StageReport& report = stage_of(plan, wire.stage);
-        if (!report.modelled) continue;
+        if (!used[static_cast<std::size_t>(w)]) continue;
         if (wire.stage != stage) stage = wire.stage, rows.push_back({fmt::format("[{}]", stage)});
         const Spec& spec = plan.specs.spec[static_cast<std::size_t>(w)];
         rows.push_back({std::string(wire.name), to_string(spec.format), to_string(spec.rounding),
@@ -81,6 +106,24 @@ std::string tables_text(const Plan& plan) {
         rows.push_back(
             {t.name, std::to_string(t.rows), std::to_string(t.columns), std::to_string(t.bytes), t.note});
     return table_text(rows, "  ");
+}
+
+/// A line a stage: what it is made of.
+std::string brief_text(const Plan& plan) {
+    std::string text;
+    const auto used = wires_used(plan);
+    for (const StageReport& stage : plan.stages) {
+        std::string wires;
+        for (std::size_t w = 0; w < kWireInfo.size(); ++w)
+            if (kWireInfo[w].stage == stage.name && used[w])
+                wires += fmt::format("{}{} {}", wires.empty() ? "" : ", ", kWireInfo[w].name,
+                                     to_string(plan.specs.spec[w].format));
+        text += fmt::format("  {:<16} {}\n", stage.name,
+                            !stage.modelled ? "left out: " + stage.why
+                            : plan.real     ? "in double"
+                                            : wires);
+    }
+    return text;
 }
 
 Json json_of_plan(const Plan& plan) {
@@ -125,6 +168,7 @@ int run(const PlanArguments& a) {
                     plan.scene.name.empty() ? "built-in scene" : plan.scene.name, plan.camera.width,
                     plan.camera.height, name_of(plan.scene.classification.method), v.name, v.dims.x, v.dims.y,
                     v.dims.z, v.scalar_bits, plan.scene.precision.preset);
+    if (a.brief) return print(text + brief_text(plan)), kDone;
     text += "\nstages (bits with sign)\n" + stages_text(plan);
     text += plan.real ? "\nevery wire is a double: nothing is rounded\n" : "\nwires\n" + wires_text(plan);
     text += "\ntables\n" + tables_text(plan);

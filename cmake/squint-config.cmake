@@ -1,0 +1,8 @@
+# find_package(squint) -> squint::pipeline (all of it), squint::core, squint::fixedpoint.  Headers: <pipeline/render.h> ...
+include(CMakeFindDependencyMacro)
+set(THREADS_PREFER_PTHREAD_FLAG ON)
+foreach(package Threads Imath fmt TBB nlohmann_json)
+  find_dependency(${package})
+endforeach()
+include(${CMAKE_CURRENT_LIST_DIR}/openimageio.cmake)
+include(${CMAKE_CURRENT_LIST_DIR}/squint-targets.cmake)
