@@ -96,18 +96,23 @@ std::string parse_spec(std::string_view text, Spec& out) {
     std::istringstream words{std::string(text)};
     std::string word;
     Spec spec = out;
-    int count = 0;
+    int formats = 0, roundings = 0, overflows = 0;
     while (words >> word) {
-        ++count;
-        if (value_of(kRoundings, word, spec.rounding) || value_of(kOverflows, word, spec.overflow)) continue;
-        if (const std::string wrong = parse_format(word, spec.format); !wrong.empty())
+        if (value_of(kRoundings, word, spec.rounding))
+            ++roundings;
+        else if (value_of(kOverflows, word, spec.overflow))
+            ++overflows;
+        else if (parse_format(word, spec.format).empty())
+            ++formats;
+        else
             return fmt::format(
                 "'{}' is not a format, a rounding (trn, trn_zero, rnd, rnd_conv) or an overflow rule (sat, "
                 "wrap)",
                 word);
     }
-    if (count == 0 || count > 3)
-        return fmt::format("'{}': expected a format, then a rounding, then an overflow rule", text);
+    if (formats + roundings + overflows == 0 || formats > 1 || roundings > 1 || overflows > 1)
+        return fmt::format("'{}': expected a format, a rounding and an overflow rule, each once at most",
+                           text);
     out = spec;
     return {};
 }

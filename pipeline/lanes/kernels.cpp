@@ -1,7 +1,8 @@
-#include "pipeline/lanes/kernels.h"
+// First: it says which targets there are, and Highway listens once.
+#include "pipeline/lanes/targets.h"
 
 #include "core/error.h"
-#include "pipeline/lanes/targets.h"
+#include "pipeline/lanes/kernels.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -45,6 +45,13 @@
 #else
 #define SQUINT_CASE_EMU128(F, ...)
 #endif
+#if HWY_TARGETS & HWY_SCALAR  // in EMU128's place where the compiler gets that wrong (g++ before 12.3)
+#define SQUINT_CASE_SCALAR(F, ...) \
+    case HWY_SCALAR:               \
+        return N_SCALAR::F(__VA_ARGS__);
+#else
+#define SQUINT_CASE_SCALAR(F, ...)
+#endif
 #define SQUINT_CALL_TARGET(TARGET, F, ...) \
     switch (TARGET) {                      \
         SQUINT_CASE_AVX3(F, __VA_ARGS__)   \
@@ -52,4 +59,5 @@
         SQUINT_CASE_SSE4(F, __VA_ARGS__)   \
         SQUINT_CASE_NEON(F, __VA_ARGS__)   \
         SQUINT_CASE_EMU128(F, __VA_ARGS__) \
+        SQUINT_CASE_SCALAR(F, __VA_ARGS__) \
     }
