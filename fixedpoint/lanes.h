@@ -137,6 +137,7 @@ HWY_INLINE Lanes<T> quantise(Lanes<T> x, const Rescale& to) {
                 sum, hn::IfThenElseZero(hn::Lt(x.v, hn::Zero(d)), hn::Set(d, static_cast<T>(to.to_zero))));
         x.v = hn::ShiftRightSame(sum, to.shift);
     }
+    if (!to.limits) return x;
     if (!to.wraps)
         return clamp(x, make_word(WordTag<Lanes<T>>{}, to.lowest),
                      make_word(WordTag<Lanes<T>>{}, to.highest));
@@ -158,6 +159,21 @@ HWY_INLINE Lanes<std::int64_t> gather(const Table& table, Lanes<std::int64_t> ro
     const Lanes<std::int64_t> index = row * make_word(WordTag<Lanes<std::int64_t>>{}, table.columns()) +
                                       make_word(WordTag<Lanes<std::int64_t>>{}, column);
     return {hn::GatherIndex(d, table.words().data(), index.v)};
+}
+
+template <class T>
+HWY_INLINE std::array<Lanes<T>, 2> gather_pair(const Table& table, Lanes<T> row, int column) {
+    if constexpr (sizeof(T) == 4)
+        if (const std::int32_t* packed = table.packed()) {
+            const hn::ScalableTag<T> d;
+            const auto index =
+                hn::Add(hn::Mul(row.v, hn::Set(d, table.columns() / 2)), hn::Set(d, column / 2));
+            const auto both = hn::GatherIndex(d, packed, index);
+            const hn::RebindToUnsigned<decltype(d)> du;
+            return {Lanes<T>{hn::And(both, hn::Set(d, 0xffff))},
+                    Lanes<T>{hn::BitCast(d, hn::ShiftRight<16>(hn::BitCast(du, both)))}};
+        }
+    return {gather(table, row, column), gather(table, row, column + 1)};
 }
 
 // ------------------------------------------------------------------------------------------------ quotients

@@ -5,25 +5,18 @@
 namespace squint {
 
 std::int64_t quantise_real(double x, const Spec& spec) {
-    const Rescale limits(spec.format.fraction_bits, spec);  // nothing to round: its limits alone
     if (std::isnan(x)) return 0;
-    // x = mantissa * 2^exponent with a 53-bit integer mantissa: then rounding is an integer matter.
-    int exponent = 0;
-    const double fraction = std::frexp(x, &exponent);
-    if (!std::isfinite(x) || exponent > 80) return x < 0 ? limits.lowest : limits.highest;
-    const Int128 mantissa = static_cast<std::int64_t>(std::ldexp(fraction, 53));
-    const int from = 53 - exponent;  // fraction bits of the mantissa
-    const int excess = from - spec.format.fraction_bits;
-    Int128 raw = 0;
-    if (excess <= 0) {
-        raw = mantissa * (Int128{1} << std::min(-excess, 60));
-    } else {
-        // Far below the last bit only the sign and "not zero" matter: 62 bits hold both.
-        const int shift = std::min(excess, 62);
-        const Int128 sticky = excess > 62 ? (mantissa > 0 ? 1 : mantissa < 0 ? -1 : 0) : mantissa;
-        raw = round_off(sticky, Rescale(shift, Spec{.format = {24, 0, true}, .rounding = spec.rounding}));
-    }
-    return static_cast<std::int64_t>(limit(raw, limits));
+    const Rescale limits(spec.format.fraction_bits, spec);  // nothing to round: its limits alone
+    // Scaling by a power of two is exact, and so are the floor of a double and what lies above it: no sum can round up just
+    // below a half.
+    const double scaled = x * static_cast<double>(spec.format.one());
+    if (!(std::abs(scaled) < 0x1p62)) return x < 0 ? limits.lowest : limits.highest;
+    const double below = std::floor(scaled), rest = scaled - below;
+    std::int64_t raw = static_cast<std::int64_t>(below);
+    if (spec.rounding == Rounding::rnd) raw += rest >= 0.5;
+    if (spec.rounding == Rounding::rnd_conv) raw += rest > 0.5 || (rest == 0.5 && (raw & 1));
+    if (spec.rounding == Rounding::trn_zero) raw += rest > 0 && raw < 0;
+    return limit(raw, limits);
 }
 
 }  // namespace squint

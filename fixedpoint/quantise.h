@@ -27,8 +27,9 @@ struct Rescale {
     int width = 0;  // for wrapping, with is_signed
     bool is_signed = false;
     bool wraps = false;
-    bool active = true;                    // Real: round and limit, or pass through (see words.h)
-    int wire = -1;                         // whose it is, for audits and traces
+    bool limits = true;  // false where the plan has proven that no value passes them: lanes leave them out
+    bool active = true;  // Real: round and limit, or pass through (see words.h)
+    int wire = -1;       // whose it is, for audits and traces
     WireStatistics* statistics = nullptr;  // Audited: where to count
     Rounding rounding = Rounding::trn;
 

@@ -15,6 +15,7 @@
 #include "fixedpoint/quantise.h"
 #include "fixedpoint/table.h"
 
+#include <array>
 #include <bit>
 #include <cassert>
 #include <cmath>
@@ -377,6 +378,12 @@ Range shift_by(Range x, Range bits);
 Range square_root(Range x);
 Range quantise(Range x, const Rescale& to);
 Range quotient(Range numerator, Range denominator, const Rescale& to);
+
+/// Columns `column` and `column + 1` of a row; `column` is even.
+template <class W>
+std::array<W, 2> gather_pair(const Table& table, W row, int column) {
+    return {gather(table, row, column), gather(table, row, column + 1)};
+}
 
 template <class W>
 constexpr W clamp(W x, W low, W high) {

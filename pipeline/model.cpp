@@ -3,6 +3,7 @@
 #include "pipeline/raycast.h"
 
 #include <cmath>
+#include <limits>
 
 namespace squint {
 namespace {
@@ -36,17 +37,19 @@ void put_word(Image& image, const char* name, std::size_t at, W word) {
             static_cast<std::uint32_t>(static_cast<std::int64_t>(std::floor(to_double(word) + 0.5)));
 }
 
+constexpr double kNoHit = std::numeric_limits<float>::max();  // Z where a ray meets nothing
+
 template <class W>
 void store(const Plan& plan, const Pixel<W>& pixel, int column, int row, Image& image) {
     const std::size_t at = static_cast<std::size_t>(row) * static_cast<std::size_t>(image.width) +
                            static_cast<std::size_t>(column);
     const std::array<double, 4> color = color_of(plan, pixel);
-    put(image, "R", at, color[0]), put(image, "G", at, color[1]), put(image, "B", at, color[2]),
-        put(image, "A", at, color[3]);
+    for (std::size_t c = 0; c < 4; ++c)
+        image.channels[c].values[at] = static_cast<float>(color[c]);  // R G B A come first
     const OutputSettings& output = plan.scene.output;
     if (output.depth) {
-        put(image, "Z", at, pixel.first_hit.value_or(INFINITY));
-        put(image, "Z.mean", at, pixel.weight > 0 ? pixel.weighted_distance / pixel.weight : INFINITY);
+        put(image, "Z", at, pixel.first_hit.value_or(kNoHit));
+        put(image, "Z.mean", at, pixel.weight > 0 ? pixel.weighted_distance / pixel.weight : kNoHit);
     }
     if (output.normals) {
         const double one = std::ldexp(1.0, plan.gradient.normal_fraction);

@@ -53,8 +53,9 @@ EntryLookup build_entry_lookup(const ClassificationInputs& in) {
                extinction = specs[Wire::table_extinction];
     const int n = in.entries.size();
     EntryLookup lookup;
-    lookup.table = Table(n, EntryLookup::columns);
+    lookup.table = Table(n, 4), lookup.matter = Table(n, 2);
     lookup.table.wire = static_cast<int>(Wire::table_color);
+    lookup.matter.wire = static_cast<int>(Wire::table_extinction);
     lookup.input_fraction = in.input_fraction;
     lookup.last_segment = n - 2;
     lookup.has_opaque = in.entries.any_opaque();
@@ -70,11 +71,13 @@ EntryLookup build_entry_lookup(const ClassificationInputs& in) {
         const double opacity = -portable::expm1(-depth);
         const double kept = decoded_alpha(opacity, alpha, in.settings.encoding);
         lookup.table.set_encoded(i, EntryLookup::alpha, opacity, quantise_real(kept, stored), stored.format);
-        lookup.table.set(i, EntryLookup::extinction, depth, extinction);
+        lookup.matter.set(i, EntryLookup::extinction, depth, extinction);
         const bool next = i + 1 < n && in.entries.entry[static_cast<std::size_t>(i + 1)].opaque;
-        lookup.table.set_raw(i, EntryLookup::opaque,
-                             entry.opaque ? EntryLookup::entry_is + (next ? EntryLookup::segment_is : 0) : 0);
+        lookup.matter.set_raw(
+            i, EntryLookup::opaque,
+            entry.opaque ? EntryLookup::entry_is + (next ? EntryLookup::segment_is : 0) : 0);
     }
+    lookup.table.pack();
     const Spec slab_alpha = specs[Wire::slab_alpha];
     // A straight colour leaves on the wire slab_ratio, an opacity on slab_alpha.
     lookup.to_color = Rescale(color.format.fraction_bits + in.input_fraction, specs[Wire::slab_ratio],

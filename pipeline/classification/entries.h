@@ -48,9 +48,11 @@ struct InputStage {
 
 /// The sampled transfer function in words.
 struct EntryLookup {
-    enum Column { red, green, blue, alpha, extinction, opaque, columns };
+    enum Column { red, green, blue, alpha };       // of `table`
+    enum MatterColumn { extinction, opaque };      // of `matter`
     enum Opaque { entry_is = 1, segment_is = 2 };  // bits of the column `opaque`
-    Table table;
+    Table table;                                   // what a full step of each entry looks like
+    Table matter;                                  // what it is made of
     int input_fraction = 0;
     int last_segment = 0;  // entries - 2
     bool has_opaque = false;
@@ -64,7 +66,8 @@ struct EntryLookup {
 
     template <class V>
     void visit(V&& v) {
-        v(table), v(to_color), v(to_alpha), v(to_depth), v(to_shorter), v(opacity.rows), v(opacity.to_alpha);
+        v(table), v(matter), v(to_color), v(to_alpha), v(to_depth), v(to_shorter), v(opacity.rows),
+            v(opacity.to_alpha);
     }
 };
 
@@ -140,19 +143,22 @@ HWY_INLINE EntryPosition<W> entry_position(const EntryLookup& e, W input) {
                        constant<W>(std::int64_t{1} << e.input_fraction))};
 }
 
-/// A column at a position, exact: raw with input_fraction bits more.
+/// Two columns of a table at a position, exact: raw with input_fraction bits more.
 template <class W>
-HWY_INLINE W entry_blend(const EntryLookup& e, const EntryPosition<W>& at, int column) {
-    return blend(gather(e.table, at.entry, column), gather(e.table, at.entry + constant<W>(1), column),
-                 at.fraction, e.input_fraction);
+HWY_INLINE std::array<W, 2> entry_blend(const EntryLookup& e, const Table& table, const EntryPosition<W>& at,
+                                        int column) {
+    const std::array<W, 2> low = gather_pair(table, at.entry, column),
+                           high = gather_pair(table, at.entry + constant<W>(1), column);
+    return {blend(low[0], high[0], at.fraction, e.input_fraction),
+            blend(low[1], high[1], at.fraction, e.input_fraction)};
 }
 
 /// One where a position is opaque: on an opaque entry, or between two (CONVENTIONS.md).
 template <class W>
 HWY_INLINE auto is_opaque(const EntryLookup& e, const EntryPosition<W>& at) {
     const W zero = constant<W>(0), one = constant<W>(std::int64_t{1} << e.input_fraction);
-    const W here = gather(e.table, at.entry, EntryLookup::opaque);
-    const W next = gather(e.table, at.entry + constant<W>(1), EntryLookup::opaque);
+    const W here = gather(e.matter, at.entry, EntryLookup::opaque);
+    const W next = gather(e.matter, at.entry + constant<W>(1), EntryLookup::opaque);
     const W entry_bit = here - shift_left(floor_shift(here, 1), 1),
             next_bit = next - shift_left(floor_shift(next, 1), 1);
     return (constant<W>(1) < here) | ((at.fraction == zero) & (zero < entry_bit)) |
@@ -166,13 +172,15 @@ HWY_INLINE Slab<W> classify_point(const EntryLookup& e, W input, W length) {
     const EntryPosition<W> at = entry_position(e, input);
     const W full = constant<W>(std::int64_t{1} << e.length_fraction);
     Slab<W> slab;
-    for (int c = 0; c < 3; ++c)
-        slab.color[static_cast<std::size_t>(c)] = quantise(entry_blend(e, at, c), e.to_color);
-    slab.alpha = quantise(entry_blend(e, at, EntryLookup::alpha), e.to_alpha);
+    const std::array<W, 2> red_green = entry_blend(e, e.table, at, EntryLookup::red);
+    const std::array<W, 2> blue_alpha = entry_blend(e, e.table, at, EntryLookup::blue);
+    slab.color = {quantise(red_green[0], e.to_color), quantise(red_green[1], e.to_color),
+                  quantise(blue_alpha[0], e.to_color)};
+    slab.alpha = quantise(blue_alpha[1], e.to_alpha);
     const auto shorter = length < full;
     if (any(shorter)) {
-        const W depth = quantise(quantise(entry_blend(e, at, EntryLookup::extinction), e.to_depth) * length,
-                                 e.to_shorter);
+        const W full_depth = quantise(entry_blend(e, e.matter, at, EntryLookup::extinction)[0], e.to_depth);
+        const W depth = quantise(full_depth * length, e.to_shorter);
         slab.alpha = select(shorter, opacity_of_depth(e.opacity, depth), slab.alpha);
     }
     if (e.has_opaque) slab.alpha = select(is_opaque(e, at), constant<W>(e.one_alpha), slab.alpha);

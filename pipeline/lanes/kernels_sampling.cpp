@@ -21,6 +21,9 @@ template <class L>
 void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int to, lanes::Samples& out) {
     const LocationStage stage = plan.location;  // a copy: nothing stored can change it
     const L full = constant<L>(std::int64_t{1} << stage.length_fraction);
+    const Index3 dims = plan.volume->dims;
+    const L row_length = constant<L>(dims.x),
+            slice = constant<L>(dims.x * dims.y);  // wrap where `index` is not used
     for (int r = 0; r < kRays; r += static_cast<int>(L::count())) {
         RayWords<L> ray;
         for (std::size_t a = 0; a < 3; ++a) {
@@ -41,6 +44,8 @@ void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int
                 store(position.cell[a], out.cell[a].v + at);
                 store(position.weight[a], out.weight[a].v + at);
             }
+            store(position.cell[0] + row_length * position.cell[1] + slice * position.cell[2],
+                  out.index.v + at);
             store(select(k == last_slab, last_length, full), out.length.v + at);
         }
     }

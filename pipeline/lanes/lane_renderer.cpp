@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 namespace squint::lanes {
 namespace {
@@ -69,24 +70,51 @@ void set_up_packet(const Plan& plan, int left, int top, int right, int bottom, P
 
 // ------------------------------------------------------------------------------------------------ voxels
 
+// Where voxels lie: offsets from a cell's lower corner to its four pairs along x.
+struct PairOffsets {
+    std::int64_t pair[4];
+    bool wide;  // indices need 64 bits
+    explicit PairOffsets(const Volume& volume) : wide(volume.voxels() > std::numeric_limits<Word>::max()) {
+        const std::int64_t y = volume.dims.y > 1 ? volume.dims.x : 0,
+                           z = volume.dims.z > 1 ? volume.dims.x * volume.dims.y : 0;
+        pair[0] = 0, pair[1] = y, pair[2] = z, pair[3] = y + z;
+    }
+};
+
+std::int64_t corner_index(const Volume& volume, const PairOffsets& offsets, const Samples& s, int i) {
+    if (!offsets.wide) return s.index.v[i];
+    return s.cell[0].v[i] + (s.cell[1].v[i] + s.cell[2].v[i] * volume.dims.y) * volume.dims.x;
+}
+
 // Corners of each sample's cell as four pairs along x.
 template <class T>
-void fetch_pairs(const Volume& volume, int from, int to, Samples& samples) {
+void fetch_pairs(const Volume& volume, const PairOffsets& offsets, int from, int to, Samples& samples) {
     const T* data = static_cast<const T*>(volume.data.get());
-    const std::int64_t row = volume.dims.x, slice = volume.dims.x * volume.dims.y;
-    const std::int64_t next_y = volume.dims.y > 1 ? row : 0, next_z = volume.dims.z > 1 ? slice : 0;
+    const T* base[4] = {data, data + offsets.pair[1], data + offsets.pair[2], data + offsets.pair[3]};
     for (int i = from * kRays; i < to * kRays; ++i) {
-        const T* lower =
-            data + samples.cell[0].v[i] + samples.cell[1].v[i] * row + samples.cell[2].v[i] * slice;
-        const T* pairs[4] = {lower, lower + next_y, lower + next_z, lower + next_y + next_z};
+        const std::int64_t at = corner_index(volume, offsets, samples, i);
         for (int p = 0; p < 4; ++p) {
             if constexpr (sizeof(T) == 2) {
-                std::memcpy(&samples.pair[p].v[i], pairs[p], 4);
+                std::memcpy(&samples.pair[p].v[i], base[p] + at, 4);
             } else {
-                samples.pair[p].v[i] = pairs[p][0] | pairs[p][1] << 16;
+                std::uint16_t both;
+                std::memcpy(&both, base[p] + at, 2);
+                samples.pair[p].v[i] = (both & 0xff) | (both >> 8) << 16;
             }
         }
     }
+}
+
+// Asks for the voxels of a batch to come: every second step will do, for neighbours share cache lines.
+template <class T>
+void prefetch_pairs(const Volume& volume, const PairOffsets& offsets, int from, int to,
+                    const Samples& samples) {
+    const T* data = static_cast<const T*>(volume.data.get());
+    for (int row = from; row < to; row += 2)
+        for (int i = row * kRays; i < (row + 1) * kRays; ++i) {
+            const T* corner = data + corner_index(volume, offsets, samples, i);
+            for (const std::int64_t offset : offsets.pair) __builtin_prefetch(corner + offset);
+        }
 }
 
 template <class T>
@@ -205,7 +233,7 @@ struct Workspace {
     PacketSetup setup;
     RayPacket rays;
     PixelPacket pixels;
-    Samples samples;
+    Samples samples[2];  // this batch, and the next one's locations
     LitSamples lit;
 };
 
@@ -215,11 +243,13 @@ class PacketLoop {
         : plan_(plan),
           kernels_(kernels),
           empty_(empty),
+          offsets_(*plan.volume),
           w_(w),
           backwards_(plan.compositing.form == CompositingForm::back_to_front) {}
 
     /// All slabs of a packet whose rays are set up.
     void run() {
+        located_ = -1;
         start_pixels();
         if (backwards_)
             run_backwards();
@@ -239,7 +269,7 @@ class PacketLoop {
     }
 
     void run_forwards() {
-        bool carried = false;  // row 0 holds the sample behind the last slab
+        bool carried = false;  // the sample behind the last slab is known: the next batch's row 0
         for (int k = 0; k < w_.setup.most_slabs;) {
             if (const int skip = leave_out(k); skip > 0) {
                 k += skip, carried = false;
@@ -268,34 +298,63 @@ class PacketLoop {
         return steps;
     }
 
+    Samples& here() { return w_.samples[current_]; }
+
+    int samples_for(int k) const {
+        return std::min(kSteps, w_.setup.most_slabs - k) + (plan_.needs_back ? 1 : 0);
+    }
+
     // Slabs k to k + steps through all stages.
     void batch(int k, int steps, bool carried) {
-        Samples& s = w_.samples;
-        if (carried) carry(s);
-        s.first = k;
+        if (located_ == k) {
+            current_ = 1 - current_;
+            if (carried) carry(w_.samples[1 - current_], here());
+        } else {
+            if (carried) carry(here(), here());
+            here().first = k;
+            kernels_.locate(plan_, w_.rays, carried ? 1 : 0, steps + (plan_.needs_back ? 1 : 0), here());
+        }
+        Samples& s = here();
         const int from = carried ? 1 : 0, to = steps + (plan_.needs_back ? 1 : 0);
-        kernels_.locate(plan_, w_.rays, from, to, s);
+        if (!backwards_) look_ahead(k + kSteps);
         if (plan_.volume->type == ScalarType::u8)
-            fetch_pairs<std::uint8_t>(*plan_.volume, from, to, s);
+            fetch_pairs<std::uint8_t>(*plan_.volume, offsets_, from, to, s);
         else
-            fetch_pairs<std::uint16_t>(*plan_.volume, from, to, s);
+            fetch_pairs<std::uint16_t>(*plan_.volume, offsets_, from, to, s);
         kernels_.interpolate(plan_, from, to, s);
         kernels_.classify(plan_, steps, s);
         if (plan_.lit) light(steps);
         kernels_.composite(plan_, w_.rays, steps, s, w_.pixels);
     }
 
-    // The last batch's last row becomes this one's first.
-    static void carry(Samples& s) {
-        constexpr std::size_t kRow = sizeof(Word) * kRays;
-        const auto move = [](Batch& b) { std::memcpy(b.v, b.v + kSteps * kRays, kRow); };
-        move(s.input), move(s.length);
-        for (int a = 0; a < 3; ++a) move(s.cell[a]), move(s.weight[a]);
+    // Locations of the batch at k, and its voxels on their way from memory while this batch computes.
+    void look_ahead(int k) {
+        located_ = -1;
+        if (k >= w_.setup.most_slabs) return;
+        Samples& next = w_.samples[1 - current_];
+        next.first = k;
+        kernels_.locate(plan_, w_.rays, plan_.needs_back ? 1 : 0, samples_for(k), next);
+        if (plan_.volume->type == ScalarType::u8)
+            prefetch_pairs<std::uint8_t>(*plan_.volume, offsets_, plan_.needs_back ? 1 : 0, samples_for(k),
+                                         next);
+        else
+            prefetch_pairs<std::uint16_t>(*plan_.volume, offsets_, plan_.needs_back ? 1 : 0, samples_for(k),
+                                          next);
+        located_ = k;
+    }
+
+    // One batch's last row becomes the next one's first.
+    static void carry(const Samples& from, Samples& to) {
+        const auto move = [](const Batch& a, Batch& b) {
+            std::memmove(b.v, a.v + kSteps * kRays, sizeof(Word) * kRays);
+        };
+        move(from.input, to.input), move(from.length, to.length);
+        for (int a = 0; a < 3; ++a) move(from.cell[a], to.cell[a]), move(from.weight[a], to.weight[a]);
     }
 
     // Gathers what is visible and not yet hidden, lights it, and puts it back.
     void light(int steps) {
-        Samples& s = w_.samples;
+        Samples& s = here();
         LitSamples& lit = w_.lit;
         int count = 0;
         for (int at = 0; at < steps * kRays; ++at) {
@@ -313,7 +372,7 @@ class PacketLoop {
     }
 
     void gather_lit(int at, int ray, int i) {
-        const Samples& s = w_.samples;
+        const Samples& s = here();
         LitSamples& lit = w_.lit;
         const bool corners_only = plan_.gradient.rule == GradientRule::analytic;
         for (int end = 0; end < (plan_.needs_back ? 2 : 1); ++end) {
@@ -338,8 +397,11 @@ class PacketLoop {
     const Plan& plan_;
     const StageKernels& kernels_;
     const EmptySpace* empty_;
+    PairOffsets offsets_;
     Workspace& w_;
     bool backwards_;
+    int current_ = 0;
+    int located_ = -1;  // first slab of the batch whose locations stand in the other buffer
 };
 
 }  // namespace

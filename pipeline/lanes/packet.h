@@ -33,6 +33,7 @@ struct alignas(64) RayPacket {
 struct alignas(64) Samples {
     Word first = 0;
     Batch cell[3], weight[3];
+    Batch index;               // of the cell's lower corner in the volume, where 32 bits hold it
     Batch pair[4];          // corners by pairs along x: the lower in the low half; y fastest
     Batch input;            // classification input
     Batch length;           // of the slab, in steps
