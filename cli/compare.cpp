@@ -48,12 +48,14 @@ std::vector<std::string> failures(const CompareArguments& a, const Comparison& c
         const bool color =
             all.channel.size() == 1 && std::string_view("RGBA").find(all.channel) != std::string::npos;
         if (a.fail_above && color && all.largest * 255 > *a.fail_above)
-            lines.push_back(fmt::format("{}: error of {:.4g} LSB8 at {} {}, allowed: {:g}", all.channel,
-                                        all.largest * 255, all.largest_x, all.largest_y, *a.fail_above));
+            lines.push_back(fmt::format("compare: {}: error of {:.4g} LSB8 at {} {}, allowed: {:g}",
+                                        all.channel, all.largest * 255, all.largest_x, all.largest_y,
+                                        *a.fail_above));
         if (a.min_psnr && (color || all.channel == "RGB") && !foreground.identical &&
             foreground.psnr.value_or(0) < *a.min_psnr)
-            lines.push_back(fmt::format("{}: PSNR of {:.2f} dB over the foreground, allowed: {:g} or more",
-                                        all.channel, foreground.psnr.value_or(0), *a.min_psnr));
+            lines.push_back(
+                fmt::format("compare: {}: PSNR of {:.2f} dB over the foreground, allowed: {:g} or more",
+                            all.channel, foreground.psnr.value_or(0), *a.min_psnr));
     }
     return lines;
 }
@@ -105,8 +107,7 @@ int run(const CompareArguments& a) {
                         {"failed", failed}});
     else if (!comparison.all.empty())
         print(figures_text(comparison, x));
-    for (const std::string& line : failed)
-        std::fputs(fmt::format("squint: compare: {}\n", line).c_str(), stderr);
+    for (const std::string& line : failed) std::fputs(fmt::format("squint: {}\n", line).c_str(), stderr);
     return failed.empty() ? kDone : kComparisonFailed;
 }
 

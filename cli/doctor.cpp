@@ -1,5 +1,6 @@
 // squint doctor: what this installation is made of, and whether it renders the bits it should.
 #include "cli/common.h"
+#include "pipeline/lanes/kernels.h"
 #include "pipeline/record.h"
 
 #include <OpenImageIO/imageio.h>
@@ -44,8 +45,7 @@ std::string compiler() {
 
 std::string targets() {
     std::string names;
-    for (std::int64_t rest = hwy::SupportedTargets(); rest != 0; rest &= rest - 1)
-        names += (names.empty() ? "" : " ") + std::string(hwy::TargetName(rest & -rest));
+    for (const std::string& name : lanes::target_names()) names += (names.empty() ? "" : " ") + name;
     return names;
 }
 

@@ -207,6 +207,9 @@ int run(const RenderArguments& a) {
     if (a.json != "-") check_output(a.json, "--json", nullptr);
 
     const Scene scene = read(a.scene);
+    if (a.options.audit && scene.precision.preset == "real")
+        throw InputError(
+            "--audit: precision.preset is \"real\", which rounds no wire; allowed: any other preset");
     refuse_beyond(a.max_memory, image_bytes(scene),
                   fmt::format("a picture of {}x{} pixels", scene.image.width, scene.image.height));
     std::vector<std::string> notes;

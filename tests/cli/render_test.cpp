@@ -181,6 +181,7 @@ TEST_F(Render, MistakesOnTheCommandLineAreOneLine) {
     expect_refusal(squint("render --path fastest"), "--path");
     expect_refusal(squint("render --max-memory lots"), "500M");
     expect_refusal(squint("render --target SSE9000" + kSmall), "SSE9000");
+    expect_refusal(squint("render --audit --set precision.preset=real" + kSmall), "--audit");
     expect_refusal(squint("render nothing.toml"), "nothing.toml");
     expect_refusal(squint("render --set volume.file=nothing.nrrd"), "nothing.nrrd");
     expect_refusal(squint("render --set 'volume.file=${SQUINT_UNSET_VARIABLE}/a.nrrd'"),
