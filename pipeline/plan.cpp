@@ -277,6 +277,7 @@ void plan_shading(Plan& plan) {
     s.power_table.wire = wire_index(Wire::power);
     s.to_light = rescale(plan, s.light_fraction, Wire::light);
     s.to_dot = rescale(plan, s.normal_fraction + s.light_fraction, Wire::dot);
+    s.to_light_view = rescale(plan, 2 * s.light_fraction, Wire::dot);
     s.to_reflected = rescale(plan, 2 * s.dot_fraction, Wire::dot);
     s.to_power_input = rescale(plan, s.dot_fraction, Wire::power);
     s.to_power = rescale(plan, 2 * s.power_fraction, Wire::power);
@@ -359,11 +360,19 @@ Range format_range(const Format& f) {
     return {f.smallest(), f.largest()};
 }
 
+// Wires that no value of this scene can saturate or wrap need no limits.
+struct LeaveOutLimits {
+    std::uint64_t limited;
+    void operator()(Rescale& r) const { r.limits = r.wire < 0 || (limited >> r.wire & 1); }
+    void operator()(Table&) const {}
+};
+
 void choose_words(Plan& plan) {
     const Volume& v = *plan.volume;
     const Range voxel{v.smallest, v.largest};
     const auto whole_steps = static_cast<std::int64_t>(most_steps(plan)) + 2;
     std::array<WordNeeds, 6> needs;
+    Range::limited = 0;
 
     RayWords<Range> ray{};
     for (std::size_t a = 0; a < 3; ++a) {
@@ -432,6 +441,7 @@ void choose_words(Plan& plan) {
                             kStages[i], needs[i].result_bits, plan.stages[i].why));
     }
     plan.word_bits = all.result_bits <= 63 ? 64 : 128;
+    visit_stages(plan, LeaveOutLimits{Range::limited});
 }
 
 void report_stages(Plan& plan) {

@@ -1,5 +1,7 @@
 #include "pipeline/presets.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 namespace squint {
@@ -130,6 +132,32 @@ CompositingForm preset_form(std::string_view name) {
     if (name == "squeeze") return CompositingForm::equation_9;
     if (name == "eight_bit") return CompositingForm::unit255_shift;
     return CompositingForm::w;
+}
+
+std::string preset_table_markdown() {
+    constexpr PresetInputs kInputs{.scalar_bits = 12,
+                                   .location_bits = 8,
+                                   .entry_bits = 12,
+                                   .direction_bits = 1,
+                                   .ray_bits = 9,
+                                   .depth_bits = 3,
+                                   .total_depth_bits = 12};
+    const std::vector<std::string> presets{"default", "squeeze", "eight_bit", "wide"};
+    std::vector<WireSpecs> specs(presets.size());
+    std::string table = "| stage | wire | carries |", rule = "|---|---|---|";
+    for (std::size_t p = 0; p < presets.size(); ++p) {
+        preset_specs(presets[p], kInputs, specs[p]);
+        table += " `" + presets[p] + "` |", rule += "---|";
+    }
+    table += "\n" + rule + "\n";
+    for (int w = 0; w < kWires; ++w) {
+        const auto wire = static_cast<Wire>(w);
+        table += fmt::format("| {} | `{}` | {} |", info(wire).stage, info(wire).name, info(wire).meaning);
+        for (const WireSpecs& spec : specs)
+            table += fmt::format(" {} {} |", to_string(spec[wire].format), to_string(spec[wire].rounding));
+        table += "\n";
+    }
+    return table;
 }
 
 }  // namespace squint

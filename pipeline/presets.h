@@ -28,6 +28,10 @@ const std::vector<std::string>& preset_names();
 /// units stand.
 bool preset_specs(std::string_view name, const PresetInputs& inputs, WireSpecs& specs);
 
+/// Every wire of every preset as a Markdown table, for 12-bit scalars, 4096 entries, axes of 256 voxels and a
+/// step of one: what docs/pipeline.md holds.
+std::string preset_table_markdown();
+
 /// What a preset composites with where the scene does not say.
 CompositingForm preset_form(std::string_view name);
 

@@ -35,6 +35,7 @@ struct ShadingStage {
     std::int64_t parabola_slope = 0;  // 2 (exponent + 1) / 2: keeps the lobe's energy; one fraction bit
     Table power_table;                // power rule `table`: 2^b + 1 rows over the dot's range
     int power_table_bits = 0;
+    Rescale to_light_view;  // Phong: L.V
     Rescale to_dot, to_reflected, to_power_input, to_power, to_power_lerp, to_fall, to_diffuse_sum,
         to_specular_sum, to_diffuse, to_specular, to_lit;
     Rescale to_light;  // per-ray half and view vectors on their way to words
@@ -42,7 +43,7 @@ struct ShadingStage {
 
     template <class V>
     void visit(V&& v) {
-        for (Rescale* r : {&to_dot, &to_reflected, &to_power_input, &to_power, &to_power_lerp, &to_fall,
+        for (Rescale* r : {&to_light_view, &to_dot, &to_reflected, &to_power_input, &to_power, &to_power_lerp, &to_fall,
                            &to_diffuse_sum, &to_specular_sum, &to_diffuse, &to_specular, &to_lit, &to_light})
             v(*r);
         v(power_table);
@@ -108,7 +109,7 @@ HWY_INLINE void shade(const ShadingStage& s, const RayWords<W>& ray, const std::
         W highlight;
         if (s.model == ShadingModel::phong) {  // R.V = 2 (N.L)(N.V) - L.V
             const W towards_eye = dot(normal, ray.view, s.to_dot);
-            const W light_view = dot(light, ray.view, s.to_dot);
+            const W light_view = dot(light, ray.view, s.to_light_view);
             highlight = quantise(shift_left(facing * towards_eye, 1) - shift_left(light_view, s.dot_fraction),
                                  s.to_reflected);
             // No reflection where no light falls; R is the same for both sides of a surface.
