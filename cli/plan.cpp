@@ -16,7 +16,7 @@ using Rows = std::vector<std::vector<std::string>>;
 struct FindTables {
     std::vector<TableReport>& tables;
     void operator()(const Rescale&) const {}
-    void operator()(const Table& table) const {
+    void operator()(const auto& table) const {
         if (table.rows() == 0) return;
         const std::string_view name =
             table.wire < 0 ? "table" : kWireInfo[static_cast<std::size_t>(table.wire)].name;

@@ -12,6 +12,7 @@
 #define SQUINT_FIXEDPOINT_LANES_H
 #endif
 
+#include "fixedpoint/cell_table.h"
 #include "fixedpoint/words.h"
 
 #include <hwy/highway.h>
@@ -176,6 +177,49 @@ HWY_INLINE std::array<Lanes<T>, 2> gather_pair(const Table& table, Lanes<T> row,
     return {gather(table, row, column), gather(table, row, column + 1)};
 }
 
+/// Cells of 16-bit words are two 32-bit words, or one of 64 bits, with the first channel lowest.
+HWY_INLINE std::array<Lanes<std::int32_t>, 4> gather_cell(const CellTable& table, Lanes<std::int32_t> row,
+                                                          Lanes<std::int32_t> column) {
+    const hn::ScalableTag<std::int32_t> d;
+    using L = Lanes<std::int32_t>;
+    const auto cell = hn::Add(hn::Mul(row.v, hn::Set(d, table.size())), column.v);
+    if (table.is_narrow()) {
+        const auto* words = reinterpret_cast<const std::int32_t*>(table.narrow_words());
+        const auto low = hn::GatherIndex(d, words, hn::Add(cell, cell));
+        const auto high = hn::GatherIndex(d, words, hn::Add(hn::Add(cell, cell), hn::Set(d, 1)));
+        const auto mask = hn::Set(d, 0xffff);
+        const hn::RebindToUnsigned<decltype(d)> du;
+        const auto upper = [&](auto v) { return hn::BitCast(d, hn::ShiftRight<16>(hn::BitCast(du, v))); };
+        return {L{hn::And(low, mask)}, L{upper(low)}, L{hn::And(high, mask)}, L{upper(high)}};
+    }
+    const auto* words = reinterpret_cast<const std::int32_t*>(table.wide_words());
+    const auto first = hn::ShiftLeft<2>(cell);
+    const auto at = [&](int c) { return L{hn::GatherIndex(d, words, hn::Add(first, hn::Set(d, c)))}; };
+    return {at(0), at(1), at(2), at(3)};
+}
+HWY_INLINE std::array<Lanes<std::int64_t>, 4> gather_cell(const CellTable& table, Lanes<std::int64_t> row,
+                                                          Lanes<std::int64_t> column) {
+    const hn::ScalableTag<std::int64_t> d;
+    const hn::RebindToUnsigned<decltype(d)> du;
+    using L = Lanes<std::int64_t>;
+    const auto cell = (row * make_word(WordTag<L>{}, table.size()) + column).v;
+    if (table.is_narrow()) {
+        const auto all = hn::BitCast(
+            du, hn::GatherIndex(d, reinterpret_cast<const std::int64_t*>(table.narrow_words()), cell));
+        const auto mask = hn::Set(du, 0xffff);
+        const auto part = [&](auto v) { return L{hn::BitCast(d, hn::And(v, mask))}; };
+        return {part(all), part(hn::ShiftRight<16>(all)), part(hn::ShiftRight<32>(all)),
+                part(hn::ShiftRight<48>(all))};
+    }
+    const auto* words = reinterpret_cast<const std::int64_t*>(table.wide_words());
+    const auto first = hn::ShiftLeft<1>(cell);
+    const auto low = hn::BitCast(du, hn::GatherIndex(d, words, first));
+    const auto high = hn::BitCast(du, hn::GatherIndex(d, words, hn::Add(first, hn::Set(d, 1))));
+    const auto mask = hn::Set(du, 0xffffffff);
+    const auto part = [&](auto v) { return L{hn::BitCast(d, hn::And(v, mask))}; };
+    return {part(low), part(hn::ShiftRight<32>(low)), part(high), part(hn::ShiftRight<32>(high))};
+}
+
 // ------------------------------------------------------------------------------------------------ quotients
 // and roots
 
@@ -222,6 +266,22 @@ HWY_INLINE Lanes<std::int32_t> square_root(Lanes<std::int32_t> x) {
     return x;
 }
 
+/// The lowest bits of a product, whatever its factors: all 32 or 64 of them.
+HWY_INLINE Lanes<std::int32_t> low_product(Lanes<std::int32_t> a, Lanes<std::int32_t> b) {
+    return a * b;
+}
+HWY_INLINE Lanes<std::int64_t> low_product(Lanes<std::int64_t> a, Lanes<std::int64_t> b) {
+    const hn::ScalableTag<std::int64_t> d;
+    const hn::ScalableTag<std::uint64_t> du;
+    const hn::ScalableTag<std::uint32_t> d32;
+    const auto x = hn::BitCast(du, a.v), y = hn::BitCast(du, b.v);
+    const auto product = [&](auto p, auto q) {
+        return hn::MulEven(hn::BitCast(d32, p), hn::BitCast(d32, q));
+    };
+    const auto cross = hn::Add(product(hn::ShiftRight<32>(x), y), product(x, hn::ShiftRight<32>(y)));
+    return {hn::BitCast(d, hn::Add(product(x, y), hn::ShiftLeft<32>(cross)))};
+}
+
 /// quantise.h's quotient.  A floating-point estimate of the floor, off by one at most, is corrected by the
 /// exact rest. 32-bit lanes: results of at most 22 bits, denominators below 2^29 (pipeline/plan.cpp checks).
 /// Saturating wires only.
@@ -237,7 +297,7 @@ HWY_INLINE Lanes<T> quotient(Lanes<T> numerator, Lanes<T> denominator, const Res
         hn::Div(hn::Mul(lanes_detail::to_floats(numerator), factor), lanes_detail::to_floats(denominator));
     const auto beyond = hn::Set(df, static_cast<F>(to.highest + 1));
     Lanes<T> q{hn::ConvertTo(d, hn::Min(ratio, beyond))};
-    Lanes<T> rest = scaled - q * denominator;
+    Lanes<T> rest = scaled - low_product(q, denominator);
     const auto below = hn::Lt(rest.v, zero);
     q.v = hn::Sub(q.v, hn::IfThenElseZero(below, one));
     rest.v = hn::Add(rest.v, hn::IfThenElseZero(below, denominator.v));

@@ -55,8 +55,10 @@ PresetInputs preset_inputs(const Plan& plan) {
     in.direction_bits = std::max(1, bits_for(plan.scene.sampling.step));
     in.ray_bits = std::max(1, bits_for(most_steps(plan)));
     double deepest = 0, total = 0;
-    for (const Entry& e : plan.entries.entry)
-        deepest = std::max(deepest, e.extinction), total += e.extinction;
+    for (const Entry& e : plan.entries.entry) {
+        deepest = std::max(deepest, e.extinction);
+        total += e.opaque ? std::max(e.extinction, 1 / plan.step_world) : e.extinction;
+    }
     in.depth_bits = std::max(1, bits_for(deepest * plan.step_world));
     in.total_depth_bits = std::max(1, bits_for(total * plan.step_world));
     return in;
@@ -224,6 +226,11 @@ void plan_classification(Plan& plan) {
                                       fraction(plan, Wire::classification_input)};
     plan.method = build_method(inputs);
     plan.needs_back = std::visit([](const auto& m) { return m.kNeedsBack; }, plan.method);
+    plan.entry_reach = std::visit([](const auto& m) { return entry_reach(m); }, plan.method);
+    ClassificationReport report;
+    std::visit([&](const auto& m) { m.describe(report); }, plan.method);
+    plan.tables = std::move(report.tables);
+    plan.notes.insert(plan.notes.end(), report.notes.begin(), report.notes.end());
 }
 
 void plan_shading(Plan& plan) {
@@ -523,6 +530,10 @@ struct Activate {
     const std::array<bool, kWires>& rounded;
     void operator()(Rescale& r) const { r.active = r.wire >= 0 && rounded[static_cast<std::size_t>(r.wire)]; }
     void operator()(Table& t) const { t.active = t.wire >= 0 && rounded[static_cast<std::size_t>(t.wire)]; }
+    void operator()(CellTable& t) const {
+        t.active = t.wire >= 0 && rounded[static_cast<std::size_t>(t.wire)];
+        if (!t.active) t.need_exact();
+    }
 };
 struct Attach {
     std::array<WireStatistics, kWires>& statistics;
@@ -530,6 +541,7 @@ struct Attach {
         if (r.wire >= 0) r.statistics = &statistics[static_cast<std::size_t>(r.wire)];
     }
     void operator()(Table&) const {}
+    void operator()(CellTable&) const {}
 };
 }  // namespace
 

@@ -34,12 +34,6 @@ struct StageReport {
     WordNeeds needs;  // sign included
 };
 
-struct TableReport {
-    std::string name;
-    std::int64_t rows = 0, columns = 0, bytes = 0;
-    std::string note;
-};
-
 struct Plan {
     Scene scene;
     std::shared_ptr<const Volume> volume;
@@ -59,6 +53,7 @@ struct Plan {
     bool lit = false;
     bool projection_mode = false;  // mip, minip, average
     bool needs_back = false;       // slab methods take the samples at both ends
+    int entry_reach = 0;           // entries beside a slab's own that its colour may come from
     bool wants_depth = false;
     Rescale to_average;             // average mode: sum of inputs over their number
     bool skips_empty_space = true;  // a transparent sample is the identity
@@ -84,7 +79,7 @@ void set_active(Plan& plan, const std::array<bool, kWires>& rounded);
 /// For audits: every Rescale of wire w counts into statistics[w].
 void attach_statistics(Plan& plan, std::array<WireStatistics, kWires>& statistics);
 
-/// Calls v(Rescale&) for every Rescale and v(Table&) for every table of a plan.
+/// Calls v(Rescale&) for every Rescale and v(Table&) or v(CellTable&) for every table of a plan.
 template <class V>
 void visit_stages(Plan& plan, V&& v) {
     plan.location.visit(v), plan.interpolation.visit(v), plan.gradient.visit(v), plan.input.visit(v);

@@ -35,7 +35,7 @@ const StageReport* find_stage(const Plan& plan, std::string_view name) {
 struct SumTables {
     std::int64_t& bytes;
     void operator()(const Rescale&) const {}
-    void operator()(const Table& table) const { bytes += static_cast<std::int64_t>(table.bytes()); }
+    void operator()(const auto& table) const { bytes += static_cast<std::int64_t>(table.bytes()); }
 };
 
 }  // namespace

@@ -24,6 +24,16 @@ double decoded_alpha(double alpha, const Spec& spec, AlphaEncoding encoding) {
 
 }  // namespace
 
+void require_range(const WireSpecs& specs, Wire wire, double largest, const char* what) {
+    const Format& f = specs[wire].format;
+    int bits = 0;
+    while (std::ldexp(1.0, bits) <= largest) ++bits;
+    if (bits > f.integer_bits)
+        throw InputError(
+            fmt::format("precision.{}: {} has {} integer bits, but {} reach {:.6g}, which needs {}",
+                        info(wire).name, to_string(f), f.integer_bits, what, largest, bits));
+}
+
 OpacityUnit build_opacity_unit(const WireSpecs& specs) {
     const Spec depth = specs[Wire::slab_depth], alpha = specs[Wire::slab_alpha];
     OpacityUnit unit;

@@ -9,8 +9,27 @@
 #include "pipeline/scene.h"
 
 #include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
 
 namespace squint {
+
+struct TableReport {
+    std::string name;
+    std::int64_t rows = 0, columns = 0, bytes = 0;
+    std::string note;
+};
+/// What a method has built, and what its builder decided: for `squint plan`.
+struct ClassificationReport {
+    std::vector<TableReport> tables;
+    std::vector<std::string> notes;
+    void add(std::string name, const Table& table, std::string note = {}) {
+        if (table.rows() > 0)
+            tables.push_back({std::move(name), table.rows(), table.columns(),
+                              static_cast<std::int64_t>(table.bytes()), std::move(note)});
+    }
+};
 
 /// Colour and opacity of a slab; the colour is straight or premultiplied, as the method's kPremultiplied
 /// says.
@@ -69,6 +88,10 @@ struct EntryLookup {
         v(table), v(matter), v(to_color), v(to_alpha), v(to_depth), v(to_shorter), v(opacity.rows),
             v(opacity.to_alpha);
     }
+    void describe(ClassificationReport& report) const {
+        report.add("entries", table, "colour, opacity, extinction and opaque of every entry");
+        report.add("opacity", opacity.rows, "1 - exp(-x) over the optical depth");
+    }
 };
 
 /// What a table builder starts from.
@@ -83,6 +106,9 @@ struct ClassificationInputs {
 /// The entries in words.  Throws InputError for formats that cannot hold them.
 EntryLookup build_entry_lookup(const ClassificationInputs& inputs);
 OpacityUnit build_opacity_unit(const WireSpecs& specs);
+
+/// Throws InputError, naming the integer bits it takes, where a wire's format cannot hold `largest`.
+void require_range(const WireSpecs& specs, Wire wire, double largest, const char* what);
 
 }  // namespace squint
 #endif

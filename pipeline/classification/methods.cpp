@@ -11,6 +11,12 @@ ClassificationMethod build_method(const ClassificationInputs& inputs) {
         case Method::pc:
         case Method::pc_mid:
             return build_post_classification(inputs);
+        case Method::pi1d:
+        case Method::pi1d_engel:
+            return build_pre_integrated_1d(inputs);
+        case Method::pi2d:
+        case Method::pi2d_no_attenuation:
+            return build_pre_integrated_2d(inputs);
         case Method::pips:
             if (inputs.settings.order == 1) return build_power_series_of_order_1(inputs);
             break;

@@ -4,13 +4,14 @@
 // A method is a type M with
 //   static constexpr bool kPremultiplied   whether its slab colour already carries the opacity
 //   static constexpr bool kNeedsBack       whether it takes the samples at both ends of the slab
-//   entries                                the entries themselves (EntryLookup), which every method holds
-//   visit(v)                               v(Rescale&) for each rescale, v(Table&, Wire) for each table it
-//   adds describe()                             tables and choices, for `squint plan`
+//   visit(v)                               v(Rescale&) for each rescale, v(Table&) or v(CellTable&) for each
+//   table describe(ClassificationReport&)        tables and choices, for `squint plan`
 //   build_...(ClassificationInputs) -> M   its table builder
 // and, for every word, classify(const M&, front, back, length) -> Slab.
 // Included once per SIMD target, so that each method's own file is.
 #include "pipeline/classification/pc.h"
+#include "pipeline/classification/pi1d.h"
+#include "pipeline/classification/pi2d.h"
 #include "pipeline/classification/pips.h"
 
 #ifndef SQUINT_PIPELINE_CLASSIFICATION_METHODS_H
@@ -20,7 +21,15 @@
 
 namespace squint {
 
-using ClassificationMethod = std::variant<PostClassification, PowerSeriesOfOrder1>;
+using ClassificationMethod =
+    std::variant<PostClassification, PreIntegrated1D, PreIntegrated2D, PowerSeriesOfOrder1>;
+
+/// Entries beside a slab's own that its colour may come from: what empty space must leave room for.
+template <class M>
+int entry_reach(const M& method) {
+    if constexpr (requires { method.entry_reach(); }) return method.entry_reach();
+    return 0;
+}
 
 /// The method that the settings name, with its tables built.  Throws InputError for orders and formats it
 /// cannot have.

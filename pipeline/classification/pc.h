@@ -17,7 +17,7 @@ struct PostClassification {
     void visit(V&& v) {
         entries.visit(v);
     }
-    int color_fraction() const { return entries.color_fraction; }
+    void describe(ClassificationReport& report) const { entries.describe(report); }
 };
 PostClassification build_post_classification(const ClassificationInputs& inputs);
 

@@ -26,7 +26,10 @@ struct PowerSeriesOfOrder1 {
     void visit(V&& v) {
         prefix.visit(v), v(moment), v(to_part), v(to_ratio);
     }
-    const EntryLookup& entries() const { return prefix.entries; }
+    void describe(ClassificationReport& report) const {
+        prefix.describe(report);
+        report.add("X1", moment, "prefix sums of colour over depth");
+    }
 };
 PowerSeriesOfOrder1 build_power_series_of_order_1(const ClassificationInputs& inputs);
 
@@ -55,7 +58,7 @@ HWY_INLINE Slab<W> classify(const PowerSeriesOfOrder1& m, W front, W back, W len
     for (int c = 0; c < 3; ++c) {
         const W colored = absolute(prefix_at(m.moment, cut.end, c, m.to_part) -
                                    prefix_at(m.moment, cut.front, c, m.to_part));
-        slab.color[static_cast<std::size_t>(c)] = min(quotient(min(colored, some), some, m.to_ratio), one);
+        slab.color[static_cast<std::size_t>(c)] = min(divide(colored, some, m.to_ratio), one);
     }
     return finish_straight(m.prefix, cut, front, length, slab);
 }

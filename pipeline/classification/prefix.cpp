@@ -14,6 +14,12 @@ PrefixLookup build_prefix_lookup(const ClassificationInputs& in) {
     p.depth = Table(n, 1);
     p.depth.wire = static_cast<int>(Wire::table_extinction);
     double sum = 0;  // trapezoids: exact for a linear extinction
+    for (int i = 0; i + 1 < n; ++i)
+        sum += 0.5 * (in.entries.entry[static_cast<std::size_t>(i)].extinction +
+                      in.entries.entry[static_cast<std::size_t>(i) + 1].extinction);
+    require_range(in.specs, Wire::table_extinction, sum * in.step_world,
+                  "the prefix sums of the entries' optical depths");
+    sum = 0;
     for (int i = 0; i < n; ++i) {
         p.depth.set(i, 0, sum * in.step_world, extinction);
         if (i + 1 < n)
@@ -38,6 +44,17 @@ PrefixLookup build_prefix_lookup(const ClassificationInputs& in) {
         p.walls.wire = static_cast<int>(Wire::table_extinction);
     }
     return p;
+}
+
+PremultipliedRules build_premultiplied_rules(const WireSpecs& specs) {
+    const Spec color = specs[Wire::slab_color];
+    const int alpha = specs[Wire::slab_alpha].format.fraction_bits, wire = static_cast<int>(Wire::slab_color);
+    PremultipliedRules rules;
+    rules.to_product = Rescale(specs[Wire::slab_ratio].format.fraction_bits + alpha, color, wire);
+    rules.to_scaled = Rescale(color.format.fraction_bits, color, wire);
+    rules.finer = color.format.fraction_bits - alpha;
+    rules.one_color = std::min(color.format.one(), color.format.largest());
+    return rules;
 }
 
 }  // namespace squint

@@ -94,7 +94,8 @@ std::shared_ptr<const BlockRanges> block_ranges(const Volume& volume) {
     return ranges;
 }
 
-EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, bool between_samples) {
+EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, bool between_samples,
+                            int entry_reach) {
     // visible_before[i]: entries below i in which anything can be seen.
     std::vector<int> visible_before(static_cast<std::size_t>(entries.size()) + 1, 0);
     for (std::size_t i = 0; i < entries.entry.size(); ++i)
@@ -103,8 +104,9 @@ EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, b
     const int last = entries.size() - 1;
     const auto any_between = [&](double low, double high) {
         // A sample's rounding may reach the next entry: one more on either side.
-        const int first = std::clamp(static_cast<int>(std::floor(entries.coordinate(low))) - 1, 0, last);
-        const int beyond = std::clamp(static_cast<int>(std::ceil(entries.coordinate(high))) + 1, 0, last);
+        const int more = 1 + entry_reach;
+        const int first = std::clamp(static_cast<int>(std::floor(entries.coordinate(low))) - more, 0, last);
+        const int beyond = std::clamp(static_cast<int>(std::ceil(entries.coordinate(high))) + more, 0, last);
         return visible_before[static_cast<std::size_t>(beyond) + 1] >
                visible_before[static_cast<std::size_t>(first)];
     };

@@ -35,6 +35,8 @@ struct EmptySpace {
 };
 
 /// `between_samples`: the method sees the range between two samples, which may lie in neighbouring blocks.
-EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, bool between_samples);
+/// `entry_reach`: entries on either side of a slab's own that its colour may come from.
+EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, bool between_samples,
+                            int entry_reach = 0);
 
 }  // namespace squint::lanes

@@ -209,7 +209,8 @@ LaneRenderer::LaneRenderer(const Plan& plan, const RenderOptions& options)
     const bool reachable = !plan.needs_back || plan.scene.sampling.step <=
                                                    kBlock;  // a slab's two ends lie in neighbouring blocks
     if (options.skip && plan.skips_empty_space && reachable)
-        empty_ = find_empty_space(*block_ranges(*plan.volume), plan.entries, plan.needs_back);
+        empty_ =
+            find_empty_space(*block_ranges(*plan.volume), plan.entries, plan.needs_back, plan.entry_reach);
 }
 
 std::string LaneRenderer::why() const {

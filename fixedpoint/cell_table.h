@@ -1,0 +1,108 @@
+// A square table of cells of four raw numbers (red, green, blue, alpha), in as few bytes as its words allow:
+// 4096 x 4096 cells of 16 bits are 128 MiB.  Every word reads a cell at once: gather_cell.
+#pragma once
+
+#include "fixedpoint/words.h"
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <vector>
+
+namespace squint {
+
+/// size x size cells; cell (row, column), channel c at (row * size + column) * 4 + c.  Copies share what was
+/// built.
+class CellTable {
+  public:
+    int wire = -1;       // whose it is, for attribution
+    bool active = true;  // Real reads the quantised words, or (false) the exact values
+
+    CellTable() = default;
+    /// Words are at most `largest`: 16 bits each where they fit, else 32.
+    CellTable(int size, std::int64_t largest) : size_(size), data_(std::make_shared<Data>()) {
+        data_->largest = largest;
+        if (largest <= 0xffff)
+            data_->narrow.resize(values() + kPadding);
+        else
+            data_->wide.resize(values() + kPadding);
+    }
+    int size() const { return size_; }
+    int columns() const { return 4; }
+    std::int64_t rows() const { return std::int64_t{size_} * size_; }
+    std::size_t values() const { return static_cast<std::size_t>(rows()) * 4; }
+    std::size_t bytes() const { return values() * (is_narrow() ? 2 : 4); }
+    bool is_narrow() const { return data_ && !data_->narrow.empty(); }
+    std::int64_t largest() const { return data_->largest; }
+
+    std::span<std::uint16_t> narrow() { return {data_->narrow.data(), values()}; }
+    std::span<std::uint32_t> wide() { return {data_->wide.data(), values()}; }
+    const std::uint16_t* narrow_words() const { return data_->narrow.data(); }
+    const std::uint32_t* wide_words() const { return data_->wide.data(); }
+
+    std::int64_t word(std::int64_t row, std::int64_t column, int channel) const {
+        const std::size_t at = index(row, column, channel);
+        return is_narrow() ? data_->narrow[at] : data_->wide[at];
+    }
+    /// Unrounded, in raw units.  Only behind need_exact().
+    double exact(std::int64_t row, std::int64_t column, int channel) const {
+        return data_->exact[index(row, column, channel)];
+    }
+    /// What fills the unrounded values, in raw units, the first time they are asked for: they take four times
+    /// the words' room.
+    void exact_from(std::function<std::vector<double>()> build) { data_->build_exact = std::move(build); }
+    void need_exact() const {
+        if (!data_) return;
+        const std::lock_guard lock(data_->mutex);
+        if (data_->exact.empty()) data_->exact = data_->build_exact();
+    }
+
+  private:
+    static constexpr std::size_t kPadding = 8;  // a vector gather may read a whole cell behind the last
+    struct Data {
+        std::vector<std::uint16_t> narrow;
+        std::vector<std::uint32_t> wide;
+        std::vector<double> exact;
+        std::function<std::vector<double>()> build_exact;
+        std::mutex mutex;
+        std::int64_t largest = 0;
+    };
+    std::size_t index(std::int64_t row, std::int64_t column, int channel) const {
+        return static_cast<std::size_t>((row * size_ + column) * 4 + channel);
+    }
+    int size_ = 0;
+    std::shared_ptr<Data> data_;
+};
+
+template <Integer W>
+std::array<W, 4> gather_cell(const CellTable& t, W row, W column) {
+    std::array<W, 4> cell;
+    for (int c = 0; c < 4; ++c)
+        cell[static_cast<std::size_t>(c)] =
+            t.word(static_cast<std::int64_t>(row), static_cast<std::int64_t>(column), c);
+    return cell;
+}
+inline std::array<Audited, 4> gather_cell(const CellTable& t, Audited row, Audited column) {
+    const std::array<Int128, 4> cell = gather_cell(t, row.v, column.v);
+    return {{{cell[0]}, {cell[1]}, {cell[2]}, {cell[3]}}};
+}
+template <class T>
+std::array<Real<T>, 4> gather_cell(const CellTable& t, Real<T> row, Real<T> column) {
+    std::array<Real<T>, 4> cell;
+    const auto i = static_cast<std::int64_t>(row.v), j = static_cast<std::int64_t>(column.v);
+    for (int c = 0; c < 4; ++c)
+        cell[static_cast<std::size_t>(c)].v =
+            static_cast<T>(t.active ? static_cast<double>(t.word(i, j, c)) : t.exact(i, j, c));
+    return cell;
+}
+/// Any word the format holds; the index, too, must fit.
+inline std::array<Range, 4> gather_cell(const CellTable& t, Range, Range) {
+    noted({0, t.rows() * 4});
+    const Range any = noted({0, t.largest()});
+    return {any, any, any, any};
+}
+
+}  // namespace squint

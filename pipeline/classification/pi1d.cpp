@@ -1,0 +1,33 @@
+#include "pipeline/classification/pi1d.h"
+
+#include "pipeline/preintegration/pi1d.h"
+
+namespace squint {
+
+PreIntegrated1D build_pre_integrated_1d(const ClassificationInputs& in) {
+    using preintegration::MeanOf;
+    PreIntegrated1D m;
+    m.prefix = build_prefix_lookup(in);
+    m.premultiplied = build_premultiplied_rules(in.specs);
+    m.is_opacity = in.settings.method == Method::pi1d;
+    const preintegration::PreIntegrated1D tables = preintegration::build_pi1d(
+        in.entries, in.step_world, m.is_opacity ? MeanOf::opacity_kye : MeanOf::clamped_extinction_engel);
+    const Spec sum = in.specs[Wire::table_moment];
+    require_range(in.specs, Wire::table_moment, tables.sum.back(),
+                  "the prefix sums of the entries' opacities");
+    m.sums = Table(in.entries.size(), PreIntegrated1D::columns);
+    m.sums.wire = static_cast<int>(Wire::table_moment);
+    for (int i = 0; i < in.entries.size(); ++i) {
+        const auto at = static_cast<std::size_t>(i);
+        for (int c = 0; c < 3; ++c)
+            m.sums.set(i, c, tables.colored_sum[static_cast<std::size_t>(c)][at], sum);
+        m.sums.set(i, PreIntegrated1D::value, tables.sum[at], sum);
+    }
+    const int fraction = sum.format.fraction_bits, mean = fraction - in.input_fraction;
+    m.to_part = Rescale(fraction + in.input_fraction, sum, static_cast<int>(Wire::table_moment));
+    const auto to = [&](Wire wire) { return Rescale(mean, in.specs[wire], static_cast<int>(wire)); };
+    m.to_color = to(Wire::slab_color), m.to_alpha = to(Wire::slab_alpha), m.to_depth = to(Wire::slab_depth);
+    return m;
+}
+
+}  // namespace squint
