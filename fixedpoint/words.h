@@ -296,6 +296,17 @@ template <class T>
 constexpr Real<T> within(Real<T> x, std::int64_t, std::int64_t) {
     return x;
 }
+/// Of whole numbers.
+template <class T>
+Real<T> bit_length(Real<T> x) {
+    int bits = 0;
+    if (x.v > 0) std::frexp(x.v, &bits);
+    return {static_cast<T>(bits)};
+}
+template <class T>
+Real<T> shift_by(Real<T> x, Real<T> bits) {
+    return {std::floor(x.v * power_of_two<T>(static_cast<int>(bits.v)))};
+}
 template <class T>
 Real<T> quantise(Real<T> x, const Rescale& to) {
     const T scaled = x.v * power_of_two<T>(-to.shift);

@@ -19,12 +19,11 @@ ClassificationMethod build_method(const ClassificationInputs& inputs) {
             return build_pre_integrated_2d(inputs);
         case Method::pips:
             if (inputs.settings.order == 1) return build_power_series_of_order_1(inputs);
-            break;
-        default:
-            break;
+            return build_moment_series(inputs);
+        case Method::leg:
+            return build_moment_series(inputs);
     }
-    throw InputError(
-        fmt::format("classification.method: {} is not built yet", name_of(inputs.settings.method)));
+    throw InputError(fmt::format("classification.method: {} is not known", name_of(inputs.settings.method)));
 }
 
 }  // namespace squint

@@ -9,6 +9,7 @@
 //   build_...(ClassificationInputs) -> M   its table builder
 // and, for every word, classify(const M&, front, back, length) -> Slab.
 // Included once per SIMD target, so that each method's own file is.
+#include "pipeline/classification/moments.h"
 #include "pipeline/classification/pc.h"
 #include "pipeline/classification/pi1d.h"
 #include "pipeline/classification/pi2d.h"
@@ -22,7 +23,7 @@
 namespace squint {
 
 using ClassificationMethod =
-    std::variant<PostClassification, PreIntegrated1D, PreIntegrated2D, PowerSeriesOfOrder1>;
+    std::variant<PostClassification, PreIntegrated1D, PreIntegrated2D, PowerSeriesOfOrder1, MomentSeries>;
 
 /// Entries beside a slab's own that its colour may come from: what empty space must leave room for.
 template <class M>

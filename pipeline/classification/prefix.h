@@ -78,7 +78,9 @@ HWY_INLINE W divide(W numerator, W denominator, const Rescale& to) {
 template <class W>
 HWY_INLINE W prefix_at(const Table& table, const EntryPosition<W>& at, int column, const Rescale& to_part) {
     const W here = gather(table, at.entry, column);
-    return here + quantise(at.fraction * (gather(table, at.entry + constant<W>(1), column) - here), to_part);
+    return within(
+        here + quantise(at.fraction * (gather(table, at.entry + constant<W>(1), column) - here), to_part), 0,
+        to_part.highest);
 }
 
 /// A slab cut where it first meets an opaque entry: in either direction, both ends included.
@@ -118,15 +120,19 @@ struct SlabDepth {
     W difference;  // |T(end) - T(front)|
     W depth;       // times length over span
 };
+/// The optical depth of a difference of T over a span of inputs, for a slab of `length`.
+template <class W>
+HWY_INLINE W depth_of(const PrefixLookup& p, W difference, W span, W length) {
+    W depth = divide(difference, max(span, constant<W>(1)), p.to_depth);
+    const auto shorter = length < constant<W>(std::int64_t{1} << p.entries.length_fraction);
+    if (any(shorter)) depth = select(shorter, quantise(depth * length, p.to_shorter), depth);
+    return depth;
+}
 template <class W>
 HWY_INLINE SlabDepth<W> slab_depth(const PrefixLookup& p, const CutSlab<W>& cut, W length) {
-    SlabDepth<W> d;
-    d.difference =
+    const W difference =
         absolute(prefix_at(p.depth, cut.end, 0, p.to_part) - prefix_at(p.depth, cut.front, 0, p.to_part));
-    d.depth = divide(d.difference, max(cut.span, constant<W>(1)), p.to_depth);
-    const auto shorter = length < constant<W>(std::int64_t{1} << p.entries.length_fraction);
-    if (any(shorter)) d.depth = select(shorter, quantise(d.depth * length, p.to_shorter), d.depth);
-    return d;
+    return {difference, depth_of(p, difference, cut.span, length)};
 }
 
 /// The straight colour of the wall that ends a slab.

@@ -1,0 +1,277 @@
+// Stage 4, PIPS(n), n = 2 to 5, and LEG(n), n = 2 to 4: pre-integration by moments of the colour over a
+// slab's own optical depth (Lee & Shin 2013, equations 22 to 25; docs/classification.md). inputs at both ends
+// (I.F) -> straight colour K (1.F), opacity (1.F).
+//
+// With y = t / x the share of the slab's depth x in front of a point, both methods are one sum over Legendre
+// moments,
+//
+//     K = sum_j g_j(x) (2j+1 and signs within g) L_j,    L_j = int_0^1 c P_j(2y - 1) dy,   g_0 = 1
+//
+// and differ in the weights g_j alone, a table over x: LEG's are bounded at every depth, PIPS's up to its
+// trusted one.  A slab seen from the other side changes the sign of odd L_j.
+//
+// Moments come from overlapped level tables (MATH B3.6): blocks of 2^(l+1) entries every 2^l, prefixes from
+// the block's own start, in units of the block's own depth, so that every word lies in [0, 1] and a slab's
+// difference cancels two bits at most for even matter.  Units cancel in L_j.  Inside an entry extinction and
+// colour are constant.
+#ifndef SQUINT_PIPELINE_CLASSIFICATION_MOMENTS_H
+#define SQUINT_PIPELINE_CLASSIFICATION_MOMENTS_H
+
+#include "pipeline/classification/prefix.h"
+
+namespace squint {
+
+inline constexpr int kMostMomentOrder = 5;
+inline constexpr int kPieces = 4;  // of a slab that LEG cuts
+
+struct MomentSeries {
+    static constexpr bool kPremultiplied = false;
+    static constexpr bool kNeedsBack = true;
+    PrefixLookup prefix;
+    Table levels;   // one column: the level's first row
+    Table moments;  // depth, then moment k of channel c in column 1 + 3 k + c
+    Table weights;  // g_1 ... g_(order - 1) over the depth
+    int order = 2;
+    int sub_entry_bits = 0;  // 2^bits sub-entries an entry
+    int word_fraction = 28;
+    int weight_fraction = 18;
+    int row_bits = 10;  // rows of `weights` are 2^-row_bits apart
+    int depth_fraction = 0;
+    bool splits = false;     // slabs deeper than `limit` are cut (LEG), or take order 1 (PIPS)
+    std::int64_t limit = 0;  // raw, of slab_depth
+    std::array<std::int64_t, 3> lowest{}, highest{};       // of the entries' colours
+    std::array<std::int64_t, kMostMomentOrder> inverse{};  // 2^24 / (k + 1)
+    Rescale to_part;                                       // within a sub-entry
+    Rescale to_product;                                    // of two words
+    Rescale to_mean;                                       // of powers
+    Rescale to_share;                                      // a word over another
+    Rescale to_weight;                                     // between rows
+    Rescale to_ratio;
+    Rescale to_cut, to_place;  // where a deep slab is cut: in T, and in an entry
+    Rescale to_piece;          // a piece's share of the light
+    Rescale to_whole;          // pieces' light over their opacity
+    std::string note;
+
+    template <class V>
+    void visit(V&& v) {
+        prefix.visit(v), v(levels), v(moments), v(weights);
+        for (Rescale* r : {&to_part, &to_product, &to_mean, &to_share, &to_weight, &to_ratio, &to_cut,
+                           &to_place, &to_piece, &to_whole})
+            v(*r);
+    }
+    void describe(ClassificationReport& report) const;
+};
+/// PIPS(2 to 5) and LEG(2 to 4).  Throws InputError for other orders.
+MomentSeries build_moment_series(const ClassificationInputs& inputs);
+
+}  // namespace squint
+#endif
+
+#include "pipeline/classification/prefix.h"
+
+#include <hwy/highway.h>
+#if defined(SQUINT_PIPELINE_CLASSIFICATION_MOMENTS_TARGET) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_PIPELINE_CLASSIFICATION_MOMENTS_TARGET
+#undef SQUINT_PIPELINE_CLASSIFICATION_MOMENTS_TARGET
+#else
+#define SQUINT_PIPELINE_CLASSIFICATION_MOMENTS_TARGET
+#endif
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+
+template <class W>
+using Powers = std::array<W, kMostMomentOrder>;
+
+/// Where an input stands between two sub-entries.
+template <class W>
+HWY_INLINE EntryPosition<W> sub_entry_position(const MomentSeries& m, W input) {
+    const EntryPosition<W> at = entry_position(m.prefix.entries, input);
+    const int bits = m.sub_entry_bits, fraction = m.prefix.entries.input_fraction - bits;
+    const W sub = min(floor_shift(at.fraction, fraction), constant<W>((std::int64_t{1} << bits) - 1));
+    return {shift_left(at.entry, bits) + sub, at.fraction - shift_left(sub, fraction)};
+}
+
+/// One end of a slab in its block: the depth there, and what the moments inside its sub-entry need.
+template <class W>
+struct MomentEnd {
+    W row, fraction;
+    W depth;           // from the block's start
+    Powers<W> powers;  // mean of t^k between the sub-entry's start and here
+};
+template <class W>
+HWY_INLINE MomentEnd<W> moment_end(const MomentSeries& m, W row, W fraction) {
+    MomentEnd<W> end{row, fraction, {}, {}};
+    const W start = gather(m.moments, row, 0), next = gather(m.moments, row + constant<W>(1), 0);
+    end.depth = start + quantise(fraction * (next - start), m.to_part);
+    // mean of t^k over [a, b] is (k b mean_(k-1) + a^k) / (k + 1)
+    const std::int64_t one = std::int64_t{1} << m.word_fraction;
+    W power = constant<W>(one);
+    end.powers[0] = power;
+    for (std::size_t k = 1; k < static_cast<std::size_t>(m.order); ++k) {
+        power = within(quantise(power * start, m.to_product), 0, one);
+        const W longer = within(quantise(end.depth * end.powers[k - 1], m.to_product), 0, one);
+        end.powers[k] =
+            quantise((longer * constant<W>(static_cast<std::int64_t>(k)) + power) * constant<W>(m.inverse[k]),
+                     m.to_mean);
+    }
+    return end;
+}
+/// Moments 0 to order - 1 of a channel at an end.
+template <class W>
+HWY_INLINE Powers<W> moments_at(const MomentSeries& m, const MomentEnd<W>& end, int channel) {
+    Powers<W> moment;
+    const W start = gather(m.moments, end.row, 1 + channel);
+    const W part = quantise(end.fraction * (gather(m.moments, end.row + constant<W>(1), 1 + channel) - start),
+                            m.to_part);
+    moment[0] = start + part;
+    for (int k = 1; k < m.order; ++k) {
+        const auto at = static_cast<std::size_t>(k);
+        moment[at] =
+            gather(m.moments, end.row, 1 + 3 * k + channel) + quantise(part * end.powers[at], m.to_product);
+    }
+    return moment;
+}
+
+/// L_j for j >= 1 from the moments int c y^k dy.
+template <class W>
+HWY_INLINE Powers<W> legendre_moments(const MomentSeries& m, const Powers<W>& mean) {
+    static constexpr std::int64_t kCoefficient[kMostMomentOrder][kMostMomentOrder] = {
+        {1, 0, 0, 0, 0}, {-1, 2, 0, 0, 0}, {1, -6, 6, 0, 0}, {-1, 12, -30, 20, 0}, {1, -20, 90, -140, 70}};
+    const W one = constant<W>(std::int64_t{1} << m.word_fraction);
+    Powers<W> result;
+    for (std::size_t j = 0; j < static_cast<std::size_t>(m.order); ++j) {
+        W sum = mean[0] * constant<W>(kCoefficient[j][0]);
+        for (std::size_t k = 1; k <= j; ++k) sum = sum + mean[k] * constant<W>(kCoefficient[j][k]);
+        result[j] = clamp(sum, constant<W>(0) - one, one);
+    }
+    return result;
+}
+
+/// The straight colour of the piece between two inputs, `depth` deep.
+template <class W>
+HWY_INLINE std::array<W, 3> series_color(const MomentSeries& m, W near, W far, W depth) {
+    const W zero = constant<W>(0), one = constant<W>(std::int64_t{1} << m.word_fraction);
+    // The level whose block holds both ends.
+    const EntryPosition<W> low = sub_entry_position(m, min(near, far)),
+                           high = sub_entry_position(m, max(near, far));
+    const std::int64_t last = static_cast<std::int64_t>(m.prefix.entries.last_segment + 1)
+                              << m.sub_entry_bits;
+    const W level = within(bit_length(within(high.entry - low.entry, 0, last)), 0, m.levels.rows() - 1);
+    const W block = within(shift_by(low.entry, zero - level), 0, last);
+    const W base = gather(m.levels, level, 0) + block + within(shift_by(block, level), 0, last);
+    const MomentEnd<W> a = moment_end(m, base + low.entry, low.fraction),
+                       b = moment_end(m, base + high.entry, high.fraction);
+    const W span = max(b.depth - a.depth, constant<W>(1));
+
+    // Weights between two rows.
+    const int fraction = m.depth_fraction - m.row_bits;
+    const W row = min(floor_shift(depth, fraction), constant<W>(m.weights.rows() - 2));
+    const W rest = min(depth - shift_left(row, fraction), constant<W>(std::int64_t{1} << fraction));
+    Powers<W> weight;
+    for (int j = 1; j < m.order; ++j)
+        weight[static_cast<std::size_t>(j)] =
+            quantise(blend(gather(m.weights, row, j - 1), gather(m.weights, row + constant<W>(1), j - 1),
+                           rest, fraction),
+                     m.to_weight);
+
+    const auto descending = far < near;
+    const auto deep = constant<W>(m.limit) < depth;
+    std::array<W, 3> color;
+    for (int c = 0; c < 3; ++c) {
+        const Powers<W> at_a = moments_at(m, a, c), at_b = moments_at(m, b, c);
+        const auto count = static_cast<std::size_t>(m.order);
+        Powers<W> mean;
+        for (std::size_t k = 0; k < count; ++k) mean[k] = clamp(at_b[k] - at_a[k], zero, one);
+        // About the lower end: powers of (t - t_a).
+        for (std::size_t pass = 1; pass < count; ++pass)
+            for (std::size_t k = count - 1; k >= pass; --k)
+                mean[k] = clamp(mean[k] - quantise(a.depth * mean[k - 1], m.to_product), zero, one);
+        // Over the slab's own depth.
+        for (std::size_t k = 0; k < count; ++k)
+            for (std::size_t times = 0; times <= k; ++times)
+                mean[k] = min(divide(mean[k], span, m.to_share), one);
+        const Powers<W> moment = legendre_moments(m, mean);
+        W sum = shift_left(moment[0], m.weight_fraction);
+        for (std::size_t j = 1; j < count; ++j) {
+            const W seen = j % 2 ? select(descending, zero - moment[j], moment[j]) : moment[j];
+            sum = sum + seen * weight[j];
+        }
+        if (!m.splits) sum = select(deep, shift_left(moment[0], m.weight_fraction), sum);
+        const auto at = static_cast<std::size_t>(c);
+        color[at] = clamp(quantise(max(sum, zero), m.to_ratio), constant<W>(m.lowest[at]),
+                          constant<W>(m.highest[at]));
+    }
+    return color;
+}
+
+/// The input at which T reaches `target`: the entry by bisection, straight inside it.
+template <class W>
+HWY_INLINE W input_at_depth(const MomentSeries& m, W target) {
+    const EntryLookup& e = m.prefix.entries;
+    const W last = constant<W>(e.last_segment);
+    W entry = constant<W>(0);
+    for (int bit = e.last_segment; bit > 0; bit /= 2) {
+        // Steps of 2^k, from the largest that fits.
+        const int step = 1 << (31 - __builtin_clz(static_cast<unsigned>(bit)));
+        const W next = min(entry + constant<W>(step), last);
+        entry = select(target < gather(m.prefix.depth, next, 0), entry, next);
+    }
+    entry = within(entry, 0, e.last_segment);
+    const W start = gather(m.prefix.depth, entry, 0);
+    const W inside = max(gather(m.prefix.depth, entry + constant<W>(1), 0) - start, constant<W>(1));
+    const W place = divide(clamp(target - start, constant<W>(0), inside), inside, m.to_place);
+    return shift_left(entry, e.input_fraction) + min(place, constant<W>(std::int64_t{1} << e.input_fraction));
+}
+
+/// The straight colour of a slab in kPieces pieces of equal depth, none but the last deeper than the limit.
+template <class W>
+HWY_INLINE std::array<W, 3> color_in_pieces(const MomentSeries& m, const CutSlab<W>& cut, W front, W length,
+                                            const SlabDepth<W>& whole) {
+    const PrefixLookup& p = m.prefix;
+    const W zero = constant<W>(0), one = constant<W>(p.entries.one_alpha);
+    const W share = min(floor_shift(whole.difference, 2), divide(whole.difference * constant<W>(m.limit),
+                                                                 max(whole.depth, constant<W>(1)), m.to_cut));
+    const auto ascending = front < cut.end_input;
+    const W signed_share = select(ascending, share, zero - share);
+    const W low = min(front, cut.end_input), high = max(front, cut.end_input);
+    W target = prefix_at(p.depth, cut.front, 0, p.to_part), near = front, near_depth = target, through = one;
+    std::array<W, 3> light{zero, zero, zero};
+    for (int piece = 1; piece <= kPieces; ++piece) {
+        target = target + signed_share;
+        const W far =
+            piece == kPieces ? cut.end_input : clamp(input_at_depth(m, max(target, zero)), low, high);
+        const W far_depth = prefix_at(p.depth, entry_position(p.entries, far), 0, p.to_part);
+        const W depth = depth_of(p, absolute(far_depth - near_depth), cut.span, length);
+        const std::array<W, 3> color = series_color(m, near, far, depth);
+        const W part =
+            min(quantise(through * opacity_of_depth(p.entries.opacity, depth), m.to_piece), through);
+        for (std::size_t c = 0; c < 3; ++c) light[c] = light[c] + part * color[c];
+        through = through - part;
+        near = far, near_depth = far_depth;
+    }
+    const W seen = max(one - through, constant<W>(1));
+    for (std::size_t c = 0; c < 3; ++c)
+        light[c] =
+            clamp(divide(light[c], seen, m.to_whole), constant<W>(m.lowest[c]), constant<W>(m.highest[c]));
+    return light;
+}
+
+template <class W>
+HWY_INLINE Slab<W> classify(const MomentSeries& m, W front, W back, W length) {
+    const CutSlab<W> cut = cut_at_wall(m.prefix, front, back);
+    const SlabDepth<W> whole = slab_depth(m.prefix, cut, length);
+    Slab<W> slab{series_color(m, front, cut.end_input, whole.depth),
+                 opacity_of_depth(m.prefix.entries.opacity, whole.depth)};
+    if (m.splits) {
+        const auto deep = constant<W>(m.limit) < whole.depth;
+        if (any(deep)) {
+            const std::array<W, 3> color = color_in_pieces(m, cut, front, length, whole);
+            for (std::size_t c = 0; c < 3; ++c) slab.color[c] = select(deep, color[c], slab.color[c]);
+        }
+    }
+    return finish_straight(m.prefix, cut, front, length, slab);
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif
