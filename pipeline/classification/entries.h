@@ -89,7 +89,8 @@ struct EntryLookup {
             v(opacity.to_alpha);
     }
     void describe(ClassificationReport& report) const {
-        report.add("entries", table, "colour, opacity, extinction and opaque of every entry");
+        report.add("entries", table, "colour and opacity of every entry");
+        report.add("matter", matter, "extinction and opaque of every entry");
         report.add("opacity", opacity.rows, "1 - exp(-x) over the optical depth");
     }
 };
