@@ -39,7 +39,7 @@ struct FindWires {
     void operator()(const Rescale& rescale) const {
         if (rescale.wire >= 0) used[static_cast<std::size_t>(rescale.wire)] = true;
     }
-    void operator()(const Table& table) const {
+    void operator()(const auto& table) const {
         if (table.wire >= 0 && table.rows() > 0) used[static_cast<std::size_t>(table.wire)] = true;
     }
 };

@@ -372,6 +372,7 @@ struct LeaveOutLimits {
     std::uint64_t limited;
     void operator()(Rescale& r) const { r.limits = r.wire < 0 || (limited >> r.wire & 1); }
     void operator()(Table&) const {}
+    void operator()(CellTable&) const {}
 };
 
 void choose_words(Plan& plan) {
