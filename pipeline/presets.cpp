@@ -66,7 +66,7 @@ WireSpecs standard(const PresetInputs& in) {
     constexpr Rounding up = Rounding::rnd;
     const int scalar = in.scalar_bits, weight = scalar <= 12 ? 12 : 10;
     const int level = 31 - scalar - weight;  // fraction bits of a middle level: I + level + weight <= 31
-    const int gradient = 18 - scalar;
+    const int gradient = 12;  // the lit samples are few: 64-bit lanes carry what weak gradients need
     WireSpecs w{};
     w[Wire::location] = u(in.location_bits, clip(31 - in.location_bits), up);
     w[Wire::direction] = s(in.direction_bits, w[Wire::location].format.fraction_bits, r);
