@@ -17,6 +17,9 @@
 
 #include <hwy/highway.h>
 
+#include <algorithm>
+#include <limits>
+
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -124,12 +127,22 @@ HWY_INLINE Lanes<T> within(Lanes<T> x, std::int64_t, std::int64_t) {
     return x;
 }
 
+/// A format's limit as lanes can hold it: one beyond them is never met, for results fit the lanes.
+template <class T>
+HWY_INLINE Lanes<T> limit_in_lanes(std::int64_t limit) {
+    return make_word(WordTag<Lanes<T>>{}, std::clamp<std::int64_t>(limit, std::numeric_limits<T>::min(),
+                                                                   std::numeric_limits<T>::max()));
+}
+
 /// quantise.h's formula, all rounding and overflow modes in one: the constants say which.
 template <class T>
 HWY_INLINE Lanes<T> quantise(Lanes<T> x, const Rescale& to) {
     const hn::ScalableTag<T> d;
     if (to.shift <= 0) {
         x = shift_left(x, -to.shift);
+    } else if (to.shift >= static_cast<int>(8 * sizeof(T))) {
+        // Truncation alone: the sign is left.  A bias as wide would have asked for wider lanes.
+        x = floor_shift(x, static_cast<int>(8 * sizeof(T)) - 1);
     } else {
         auto sum = hn::Add(x.v, hn::Set(d, static_cast<T>(to.bias)));
         if (to.to_even) sum = hn::Add(sum, hn::And(hn::ShiftRightSame(x.v, to.shift), hn::Set(d, T{1})));
@@ -139,9 +152,7 @@ HWY_INLINE Lanes<T> quantise(Lanes<T> x, const Rescale& to) {
         x.v = hn::ShiftRightSame(sum, to.shift);
     }
     if (!to.limits) return x;
-    if (!to.wraps)
-        return clamp(x, make_word(WordTag<Lanes<T>>{}, to.lowest),
-                     make_word(WordTag<Lanes<T>>{}, to.highest));
+    if (!to.wraps) return clamp(x, limit_in_lanes<T>(to.lowest), limit_in_lanes<T>(to.highest));
     const int unused = static_cast<int>(8 * sizeof(T)) - to.width;
     if (unused <= 0) return x;
     if (to.is_signed) return floor_shift(shift_left(x, unused), unused);
@@ -312,7 +323,7 @@ HWY_INLINE Lanes<T> quotient(Lanes<T> numerator, Lanes<T> denominator, const Res
                                hn::And(hn::Eq(twice, denominator.v), hn::Ne(hn::And(q.v, one), zero)));
         q.v = hn::Add(q.v, hn::IfThenElseZero(up, one));
     }
-    return clamp(q, make_word(WordTag<Lanes<T>>{}, to.lowest), make_word(WordTag<Lanes<T>>{}, to.highest));
+    return clamp(q, limit_in_lanes<T>(to.lowest), limit_in_lanes<T>(to.highest));
 }
 
 // ------------------------------------------------------------------------------------------------ memory:

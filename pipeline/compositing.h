@@ -80,7 +80,7 @@ HWY_INLINE auto goes_on(const CompositingStage& s, const Accumulated<W>& pixel) 
 }
 template <class T>
 HWY_INLINE bool goes_on(const CompositingStage& s, const Accumulated<Real<T>>& pixel) {
-    return !(transparency(s, pixel).v < s.threshold_exact * power_of_two<double>(s.transparency_fraction));
+    return !(transparency(s, pixel).v < s.threshold_exact * static_cast<double>(s.unit()));
 }
 
 /// x y with 1.0 = 2^F - 1: one bare shift, or Blinn's exact rounding of x y / (2^F - 1) (Squeeze, equation

@@ -99,6 +99,9 @@ void check_formats(const Plan& plan) {
     const auto longest = static_cast<double>(std::max({v.dims.x, v.dims.y, v.dims.z})) - 1;
     require_integer_bits(plan, Wire::location, bits_for(longest),
                          fmt::format("a volume of {} voxels along its longest axis", longest + 1));
+    if (plan.specs[Wire::location].overflow == Overflow::wrap)
+        throw InputError(
+            "precision.location: wrap, but a location is held inside the volume: sat is allowed");
     require_signed(plan, Wire::direction);
     require_integer_bits(plan, Wire::direction, bits_for(plan.scene.sampling.step),
                          fmt::format("a step of {} voxels", plan.scene.sampling.step));
@@ -338,7 +341,7 @@ void plan_compositing(Plan& plan) {
         s.color_to_code = rescale(plan, s.color_fraction, Wire::color);
     }
     s.threshold_exact = plan.scene.sampling.termination;
-    s.threshold = static_cast<std::int64_t>(std::ceil(std::ldexp(s.threshold_exact, t)));
+    s.threshold = static_cast<std::int64_t>(std::ceil(s.threshold_exact * static_cast<double>(s.unit())));
     const bool identity = s.form != CompositingForm::unit255_shift &&
                           plan.scene.compositing.mode != CompositingMode::average &&
                           plan.scene.compositing.mode != CompositingMode::minip;
@@ -399,12 +402,13 @@ void choose_words(Plan& plan) {
         position = cell_position(plan.location, location);
         for (Range& w : position.weight) w = within(w, 0, std::int64_t{1} << plan.interpolation.weight_bits);
     });
-    Range sample;
+    Range sample, input;
     needs[1] = needs_of([&] {
         Cell<Range> cell;
         cell.corner.fill(voxel);
         sample = interpolate(plan.interpolation, cell, position.weight);
     });
+    plan.input_needs = needs_of([&] { input = classification_input(plan.input, sample); });
     std::array<Range, 3> normal{};
     if (plan.lit)
         needs[2] = needs_of([&] {
@@ -423,7 +427,6 @@ void choose_words(Plan& plan) {
         });
     Slab<Range> slab;
     needs[3] = needs_of([&] {
-        Range input = classification_input(plan.input, sample);
         if (plan.scene.compositing.mode == CompositingMode::average && plan.projection_mode)
             input = input + quotient(input * up_to(whole_steps), up_to(whole_steps), plan.to_average);
         input = within(input, 0, plan.input.highest);
@@ -438,7 +441,7 @@ void choose_words(Plan& plan) {
         composite(plan.compositing, pixel, slab.color, slab.alpha);
     });
 
-    WordNeeds all;
+    WordNeeds all = plan.input_needs;
     for (std::size_t i = 0; i < 6; ++i) {
         plan.stages[i].needs = needs[i];
         all.merge(needs[i]);

@@ -26,7 +26,7 @@ struct StageKernels {
 
 /// Bits of the lanes each stage runs in: 32 or 64.
 struct StageWidths {
-    int location = 32, interpolation = 32, classification = 32, shading = 64, compositing = 32;
+    int location = 32, interpolation = 32, input = 32, classification = 32, shading = 64, compositing = 32;
 };
 
 /// One of Highway's targets this processor has, by name; the best for an empty name.  Throws InputError,

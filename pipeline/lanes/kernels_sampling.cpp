@@ -51,7 +51,8 @@ void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int
     }
 }
 
-template <class L>
+/// I: the lanes of the way from a sample to table entries, no narrower than L.
+template <class L, class I>
 void interpolate_rows(const Plan& plan, int from, int to, lanes::Samples& samples) {
     const InterpolationStage stage = plan.interpolation;
     const InputStage input = plan.input;
@@ -65,8 +66,15 @@ void interpolate_rows(const Plan& plan, int from, int to, lanes::Samples& sample
         }
         const std::array<L, 3> weight{load<L>(samples.weight[0].v + at), load<L>(samples.weight[1].v + at),
                                       load<L>(samples.weight[2].v + at)};
-        store(classification_input(input, interpolate(stage, cell, weight)), samples.input.v + at);
+        const L sample = interpolate(stage, cell, weight);
+        if constexpr (std::is_same_v<L, I>)
+            store(classification_input(input, sample), samples.input.v + at);
+        else
+            store(sample, samples.input.v + at);
     }
+    if constexpr (!std::is_same_v<L, I>)
+        for (int at = from * kRays; at < to * kRays; at += static_cast<int>(I::count()))
+            store(classification_input(input, load<I>(samples.input.v + at)), samples.input.v + at);
 }
 
 }  // namespace
@@ -75,7 +83,9 @@ void sampling_kernels_of(const lanes::StageWidths& widths, lanes::StageKernels& 
     using Narrow = Lanes<std::int32_t>;
     using Wide = Lanes<std::int64_t>;
     kernels.locate = widths.location == 32 ? &locate_rows<Narrow> : &locate_rows<Wide>;
-    kernels.interpolate = widths.interpolation == 32 ? &interpolate_rows<Narrow> : &interpolate_rows<Wide>;
+    kernels.interpolate = widths.interpolation == 64 ? &interpolate_rows<Wide, Wide>
+                          : widths.input == 64       ? &interpolate_rows<Narrow, Wide>
+                                                     : &interpolate_rows<Narrow, Narrow>;
 }
 
 }  // namespace squint::HWY_NAMESPACE

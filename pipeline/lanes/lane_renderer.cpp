@@ -25,7 +25,7 @@ int bits_of(const WordNeeds& needs) {
 
 StageWidths widths_of(const Plan& plan) {
     const auto bits = [&](std::size_t stage) { return bits_of(plan.stages[stage].needs); };
-    return {bits(0), bits(1), bits(3), 64, bits(5)};
+    return {bits(0), bits(1), bits_of(plan.input_needs), bits(3), 64, bits(5)};
 }
 
 // ------------------------------------------------------------------------------------------------ rays
@@ -143,6 +143,9 @@ int empty_steps(const Plan& plan, const EmptySpace& empty, const PacketSetup& se
                 const PixelPacket& pixels, int k) {
     const double cell_unit = std::ldexp(1.0, plan.location.location_fraction);
     const double direction_unit = std::ldexp(1.0, plan.location.direction_fraction);
+    const auto block_of = [&](double p, int a) {
+        return std::min(static_cast<std::int64_t>(p) >> kBlockBits, empty.blocks[a] - 1);
+    };
     int least = setup.most_slabs - k;
     for (int r = 0; r < kRays && least > 0; ++r) {
         if (!pixels.active.v[r] || k >= packet.slabs.v[r]) continue;
@@ -152,7 +155,7 @@ int empty_steps(const Plan& plan, const EmptySpace& empty, const PacketSetup& se
             const double limit = static_cast<double>(plan.volume->dims[a] - 1);
             p[a] = std::clamp(packet.first[a].v[r] / cell_unit + k * (packet.step[a].v[r] / direction_unit),
                               0.0, limit);
-            block[a] = std::min(static_cast<std::int64_t>(p[a]) >> kBlockBits, empty.blocks[a] - 1);
+            block[a] = block_of(p[a], a);
         }
         const int distance = empty.at(block.x, block.y, block.z);
         if (distance == 0) return 0;
@@ -167,6 +170,12 @@ int empty_steps(const Plan& plan, const EmptySpace& empty, const PacketSetup& se
         }
         // Sample k + m is the last one inside: m + 1 slabs may go (the next sample is looked at anew).
         least = std::min(least, steps < 0 ? 0 : static_cast<int>(steps) + 1);
+        // The ray's last sample stands at its exit, off P0 + kV by what rounding V adds up to.
+        const int last = packet.last_index.v[r] - (plan.needs_back ? 1 : 0);
+        if (k + least <= last) continue;
+        Index3 exit;
+        for (int a = 0; a < 3; ++a) exit[a] = block_of(packet.last[a].v[r] / cell_unit, a);
+        if (empty.at(exit.x, exit.y, exit.z) == 0) least = std::min(least, std::max(last - k, 0));
     }
     return least;
 }
@@ -185,11 +194,17 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
     if (plan.lit && plan.scene.shading.gradient == GradientRule::central_samples)
         return "gradients from samples run in the model";
     if (plan.volume->dims.x < 2) return "the volume is one voxel thick along x";
-    for (std::size_t i = 0; i < plan.stages.size(); ++i)
-        if (plan.stages[i].modelled && bits_of(plan.stages[i].needs) == 0)
-            return fmt::format("{}: factors of {} bits and results of {} fit no lane (32 and 64)",
-                               plan.stages[i].name, plan.stages[i].needs.operand_bits,
-                               plan.stages[i].needs.lane_bits);
+    const auto too_wide = [](std::string_view name, const WordNeeds& needs) -> std::optional<std::string> {
+        if (bits_of(needs) != 0) return std::nullopt;
+        return fmt::format("{}: factors of {} bits and results of {} fit no lane (32 and 64)", name,
+                           needs.operand_bits, needs.lane_bits);
+    };
+    for (const StageReport& stage : plan.stages)
+        if (const auto obstacle = too_wide(stage.name, stage.needs); stage.modelled && obstacle)
+            return obstacle;
+    if (const auto obstacle = too_wide("classification input", plan.input_needs)) return obstacle;
+    if (plan.lit && plan.specs[Wire::normal].overflow == Overflow::wrap)
+        return "a normal that wraps round is divided by the model";
     for (const Wire wire : {Wire::location, Wire::direction, Wire::weight, Wire::length,
                             Wire::classification_input, Wire::slab_ratio, Wire::slab_color, Wire::slab_alpha,
                             Wire::lit_color, Wire::color, Wire::transparency, Wire::light}) {
@@ -206,8 +221,11 @@ LaneRenderer::LaneRenderer(const Plan& plan, const RenderOptions& options)
       target_(find_target(options.target)),
       widths_(widths_of(plan)),
       kernels_(kernels_for(plan, widths_, target_)) {
-    const bool reachable = !plan.needs_back || plan.scene.sampling.step <=
-                                                   kBlock;  // a slab's two ends lie in neighbouring blocks
+    // A slab's two ends must lie in neighbouring blocks; its far one may be off by what V's rounding adds up
+    // to.
+    const double drift =
+        std::ldexp(static_cast<double>(-plan.location.low[0]), -plan.location.common_fraction);
+    const bool reachable = !plan.needs_back || plan.scene.sampling.step + drift <= kBlock;
     if (options.skip && plan.skips_empty_space && reachable)
         empty_ =
             find_empty_space(*block_ranges(*plan.volume), plan.entries, plan.needs_back, plan.entry_reach);

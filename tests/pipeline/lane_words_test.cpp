@@ -1,0 +1,204 @@
+// Lanes equal the model word for word: every operation of fixedpoint/lanes.h on every SIMD target, 32 and 64
+// bits, against the integer words of fixedpoint/words.h.
+#include "pipeline/lanes/targets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "tests/pipeline/lane_words_test.cpp"
+#include <hwy/foreach_target.h>
+
+#include "fixedpoint/lanes.h"
+#include "fixedpoint/words.h"
+
+#include <random>
+#include <string>
+#include <vector>
+
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+namespace {
+
+// The integers' overloads; those of lanes are found by their arguments.
+using squint::absolute, squint::affine, squint::bit_length, squint::blend, squint::clamp, squint::floor_shift,
+    squint::gather, squint::max, squint::min, squint::quantise, squint::quotient, squint::select,
+    squint::shift_by, squint::shift_left, squint::square_root;
+
+/// Draws operands, runs one operation on lanes and on integers, and keeps the first difference of each.
+template <class T>
+class Comparison {
+  public:
+    using L = Lanes<T>;
+    static constexpr int kMost = 16;  // lanes of the widest target
+
+    explicit Comparison(std::vector<std::string>& wrong) : wrong_(wrong) {}
+
+    std::int64_t between(std::int64_t low, std::int64_t high) {
+        return low + static_cast<std::int64_t>(random_() % static_cast<std::uint64_t>(high - low + 1));
+    }
+    /// Any magnitude below 2^bits.
+    std::int64_t any(int bits, bool negative = true) {
+        const std::int64_t size = std::int64_t{1} << between(0, bits);
+        return between(negative ? -size : 0, size - 1);
+    }
+
+    /// f(x, y, z) on both words, with operands from draw(i) for operand i.
+    template <class Draw, class F>
+    void operator()(const std::string& name, Draw&& draw, F&& f) {
+        std::int32_t in[3][kMost], out[kMost];
+        for (int operand = 0; operand < 3; ++operand)
+            for (std::int32_t& x : in[operand]) x = static_cast<std::int32_t>(draw(operand));
+        store(f(load<L>(in[0]), load<L>(in[1]), load<L>(in[2])), out);
+        for (std::size_t i = 0; i < L::count(); ++i) {
+            const auto expected = static_cast<std::int32_t>(
+                f(std::int64_t{in[0][i]}, std::int64_t{in[1][i]}, std::int64_t{in[2][i]}));
+            if (out[i] == expected) continue;
+            wrong_.push_back(name + '(' + std::to_string(in[0][i]) + ", " + std::to_string(in[1][i]) + ", " +
+                             std::to_string(in[2][i]) + ") of " + std::to_string(8 * sizeof(T)) +
+                             " bits: " + std::to_string(out[i]) + ", not " + std::to_string(expected));
+            return;
+        }
+    }
+
+  private:
+    std::vector<std::string>& wrong_;
+    std::mt19937_64 random_{7};
+};
+
+template <class T>
+Spec any_spec(Comparison<T>& compare) {
+    Spec spec{{static_cast<int>(compare.between(0, 24)), static_cast<int>(compare.between(0, 24)),
+               compare.between(0, 1) == 1},
+              static_cast<Rounding>(compare.between(0, 3)),
+              static_cast<Overflow>(compare.between(0, 1))};
+    if (spec.format.integer_bits + spec.format.fraction_bits == 0) spec.format.integer_bits = 1;
+    return spec;
+}
+
+template <class T>
+void compare_quantise(Comparison<T>& compare) {
+    const Spec spec = any_spec(compare);
+    const Rescale to(static_cast<int>(compare.between(0, 48)), spec);
+    // The plan gives a stage lanes that hold x, x + bias and the result.
+    const int shift = to.shift, operand = 31 - std::max(-shift, 0);
+    if (operand < 1 || (shift > 30 && sizeof(T) == 4 && (to.bias || to.to_zero))) return;
+    const std::int64_t room = sizeof(T) == 4 ? 0x7fffffff - to.bias - to.to_even - to.to_zero : 0x7fffffff;
+    const std::int64_t most = std::min(room, (std::int64_t{1} << operand) - 1);
+    // An unsigned format that wraps negative numbers to more than 31 bits is refused by the lanes.
+    const bool negative = to.lowest < 0 || !to.wraps || to.width <= 31;
+    if (most < 1) return;
+    compare(
+        "quantise to " + to_string(spec) + " by " + std::to_string(shift),
+        [&](int) { return std::min(std::max(compare.any(31, negative), negative ? -most : 0), most); },
+        [&](auto x, auto, auto) { return quantise(x, to); });
+}
+
+template <class T>
+void compare_arithmetic(Comparison<T>& compare) {
+    const auto word = [&](int) { return compare.any(29); };
+    compare("+", word, [](auto x, auto y, auto) { return x + y; });
+    compare("-", word, [](auto x, auto y, auto) { return x - y; });
+    compare("min", word, [](auto x, auto y, auto) { return min(x, y); });
+    compare("max", word, [](auto x, auto y, auto) { return max(x, y); });
+    compare("clamp", word, [](auto x, auto y, auto z) { return clamp(x, min(y, z), max(y, z)); });
+    compare("absolute", word, [](auto x, auto, auto) { return absolute(x); });
+    compare("<", word, [](auto x, auto y, auto z) { return select(x < y, y, z); });
+    compare(
+        "==", [&](int) { return compare.between(-2, 2); },
+        [](auto x, auto y, auto z) { return select(x == y, x + y, z); });
+    compare(
+        "& | !", [&](int) { return compare.between(-2, 2); },
+        [](auto x, auto y, auto z) { return select(((x < y) & (y < z)) | !(x == z), x, z - y); });
+    compare(
+        "*", [&](int) { return compare.any(15); }, [](auto x, auto y, auto) { return x * y; });
+    const int bits = static_cast<int>(compare.between(0, 15));
+    compare("floor_shift", word, [&](auto x, auto, auto) { return floor_shift(x, bits); });
+    compare(
+        "shift_left", [&](int) { return compare.any(15); },
+        [&](auto x, auto, auto) { return shift_left(x, bits); });
+    const auto within_weight = [&](int i) {
+        return i == 2 ? compare.between(0, std::int64_t{1} << bits) : compare.any(14);
+    };
+    compare("blend", within_weight, [&](auto x, auto y, auto w) { return blend(x, y, w, bits); });
+    compare(
+        "affine", [&](int) { return compare.any(14); },
+        [](auto x, auto y, auto z) { return affine(x, y, z, 0, 0); });
+    compare(
+        "bit_length", [&](int) { return compare.any(31, false); },
+        [](auto x, auto, auto) { return bit_length(x); });
+    compare(
+        "shift_by", [&](int i) { return i == 1 ? compare.between(-15, 15) : compare.any(15, false); },
+        [](auto x, auto by, auto) { return shift_by(x, by); });
+}
+
+template <class T>
+void compare_tables(Comparison<T>& compare, const Table& table) {
+    const auto row = [&](int) { return compare.between(0, table.rows() - 1); };
+    for (int column = 0; column < table.columns(); ++column)
+        compare("gather", row, [&](auto x, auto, auto) { return gather(table, x, column); });
+}
+
+template <class T>
+void compare_quotients(Comparison<T>& compare) {
+    Spec spec = any_spec(compare);
+    spec.overflow = Overflow::sat;
+    const int gained = static_cast<int>(compare.between(0, 12));
+    // 32-bit lanes: results of at most 22 bits, scaled numerators and denominators below 2^29.
+    spec.format = {static_cast<int>(compare.between(1, 8)), static_cast<int>(compare.between(0, 14)), false};
+    const Rescale to(spec.format.fraction_bits - gained, spec);
+    const int wide = sizeof(T) == 4 ? 28 - gained : 30;
+    compare(
+        "quotient to " + to_string(spec),
+        [&](int i) { return i == 1 ? 1 + compare.any(28, false) : compare.any(wide, false); },
+        [&](auto x, auto y, auto) { return quotient(x, y, to); });
+}
+
+template <class T>
+void compare_words(std::vector<std::string>& wrong) {
+    Comparison<T> compare(wrong);
+    Table table(200, 3);
+    for (int i = 0; i < 200; ++i)
+        for (int c = 0; c < 3; ++c) table.set_raw(i, c, compare.any(31));
+    for (int round = 0; round < 4000 && wrong.size() < 4; ++round) {
+        compare_arithmetic(compare), compare_quantise(compare), compare_quotients(compare);
+        compare_tables(compare, table);
+    }
+    if constexpr (sizeof(T) == 8)
+        for (int round = 0; round < 4000 && wrong.size() < 4; ++round)
+            compare(
+                "square_root", [&](int) { return compare.any(26, false); },
+                [](auto x, auto y, auto) {
+                    return square_root(x * x + min(y, x + x));  // floor(sqrt) = x up to x^2 + 2 x
+                });
+}
+
+}  // namespace
+
+void compare_all_words(std::vector<std::string>& wrong) {
+    compare_words<std::int32_t>(wrong);
+    compare_words<std::int64_t>(wrong);
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+#include "pipeline/lanes/kernels.h"
+
+#include <gtest/gtest.h>
+
+namespace squint {
+namespace {
+
+void on_target(std::int64_t target,
+               std::vector<std::string>& wrong){SQUINT_CALL_TARGET(target, compare_all_words, wrong)}
+
+TEST(LaneWords, EqualTheModelsOnEveryTarget) {
+    for (const std::string& name : lanes::target_names()) {
+        std::vector<std::string> wrong;
+        on_target(lanes::find_target(name), wrong);
+        for (const std::string& line : wrong) ADD_FAILURE() << name << ": " << line;
+    }
+}
+
+}  // namespace
+}  // namespace squint
+#endif
