@@ -107,9 +107,13 @@ TEST(Quantise, OneTimesOneIsOne) {
 // ------------------------------------------------------------------------------------------ from doubles
 
 /// x 2^F is exact in a double (a power of two, upwards), and so are its integer part and its fraction.
+/// From 2^62 on, and so for infinities, wrapping formats saturate too.
 double by_parts(double x, const Spec& spec) {
     double whole = 0;
-    const double part = std::modf(std::ldexp(x, spec.format.fraction_bits), &whole);
+    const double scaled = std::ldexp(x, spec.format.fraction_bits);
+    if (std::abs(scaled) >= 0x1p62)
+        return static_cast<double>(x < 0 ? spec.format.smallest() : spec.format.largest());
+    const double part = std::modf(scaled, &whole);
     const bool odd = std::fmod(whole, 2) != 0;
     switch (spec.rounding) {
         case Rounding::trn:

@@ -269,7 +269,7 @@ TEST(Shading, ColouredLightsTintTheirOwnChannelOnly) {
 
 TEST(Shading, IntervalsHoldEveryLitColour) {
     std::mt19937_64 random(2);
-    for (int i = 0; i < 5000; ++i) {
+    for (int i = 0; i < 800; ++i) {
         ShadingStage s =
             stage_of(0.3, 0.5, 0.4, random() % 2 ? ShadingModel::phong : ShadingModel::blinn_phong);
         const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-52 - 1; };
