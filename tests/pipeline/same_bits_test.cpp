@@ -194,7 +194,12 @@ Case draw_case(unsigned seed) {
     scene.sampling.position = draw.any_of<PositionRule>();
     if (draw.once_in(6)) scene.sampling.interpolation = InterpolationRule::nearest;
     scene.classification = {};
-    scene.classification.method = draw.one_of({Method::pc, Method::pc_mid, Method::pips, Method::pips});
+    ClassificationSettings& method = scene.classification;
+    method.method = draw.one_of({Method::pc, Method::pc_mid, draw.any_of<Method>(), draw.any_of<Method>()});
+    method.order = static_cast<int>(method.method == Method::leg ? draw.between(2, 4) : draw.between(1, 5));
+    method.table_size = 64;
+    method.lookup = draw.any_of<TableLookup>();
+    method.opaque_prediction = !draw.once_in(8);
     if (draw.once_in(5)) scene.classification.encoding = AlphaEncoding::sqrt_alpha;
     if (draw.once_in(16)) scene.compositing.mode = draw.any_of<CompositingMode>();
     scene.compositing.form = draw.any_of<CompositingForm>();
