@@ -13,8 +13,10 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -79,9 +81,13 @@ Scene data_scene(const std::string& name, bool lit, const std::vector<std::strin
 }
 
 Scene phantom_scene(std::int64_t size, bool lit, const std::vector<std::string>& overrides) {
-    std::vector<std::string> all{"volume.procedural=phantom", fmt::format("volume.dims=[{}]", size),
-                                 "image.width=800", "image.height=800",
-                                 fmt::format("camera.height={}", 1.2 * static_cast<double>(size))};
+    std::vector<std::string> all{
+        "volume.procedural=phantom",
+        fmt::format("volume.dims=[{}]", size),
+        "image.width=800",
+        "image.height=800",
+        fmt::format("camera.height={}", 1.05 * static_cast<double>(size)),
+        fmt::format("transfer_function.unit_distance={}", static_cast<double>(size) / 128)};
     all.insert(all.end(), overrides.begin(), overrides.end());
     return with_light(scene_with(built_in_scene(), all), lit);
 }
@@ -195,6 +201,10 @@ std::vector<double> Settings::numbers(const std::string& key) const {
     return numbers;
 }
 
+double processor_ms() {
+    return 1000.0 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
+}
+
 double median(std::vector<double> values) {
     if (values.empty()) return 0;
     std::sort(values.begin(), values.end());
@@ -236,6 +246,11 @@ Json machine() {
             {"compiler", __VERSION__},
             {"version", version()},
             {"load", load()}};
+}
+
+void print_line(const Json& json) {
+    std::fputs((json.dump() + "\n").c_str(), stdout);
+    std::fflush(stdout);
 }
 
 }  // namespace squint::bench

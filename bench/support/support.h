@@ -23,7 +23,8 @@ std::vector<std::string> data_scene_names();
 bool has_data();
 /// One of configs/bench, with overrides `key=value` applied; lit as written, or without lights.
 Scene data_scene(const std::string& name, bool lit, const std::vector<std::string>& overrides = {});
-/// A procedural phantom of size^3 with its own transfer function, 800x800, filling the picture.
+/// A procedural phantom of size^3 with its own transfer function, 800x800, filling the picture; as dense at
+/// every size.
 Scene phantom_scene(std::int64_t size, bool lit, const std::vector<std::string>& overrides = {});
 
 /// The scene's volume; loaded again only when another was asked for in between.
@@ -67,6 +68,10 @@ class Stopwatch {
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
+/// Milliseconds of processor this program has used, all threads together: what a busy machine does not
+/// stretch.
+double processor_ms();
+
 double median(std::vector<double> values);
 
 /// Highest resident memory since the last reset, in bytes; 0 where the system does not tell.
@@ -76,5 +81,8 @@ std::int64_t peak_memory();
 /// Runnable processes over the last minute, and the machine: beside every figure.
 double load();
 Json machine();
+
+/// One line on standard output, at once: a long run that is cut short keeps what it measured.
+void print_line(const Json& json);
 
 }  // namespace squint::bench

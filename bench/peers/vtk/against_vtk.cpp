@@ -1,5 +1,6 @@
 // squint against VTK's fixed-point mapper: the same scenes, frame by frame in turn, in one run.  Progress on
-// standard error, JSON on standard output; bench/tables.py makes docs/measurements/vtk.md of it.
+// standard error, a line of JSON a case on standard output; bench/tables.py makes docs/measurements/vtk.md of
+// it.
 //
 //     SQUINT_DATA=... bench_against_vtk [scenes=cthead_opaque,...] [lit=0,1] [steps=1,0.5] [threads=1,2]
 //     [frames=8]
@@ -21,8 +22,10 @@ using namespace squint;
 using namespace squint::bench;
 
 struct Times {
-    std::vector<double> cast, whole;  // ms
-    Json json() const { return {{"cast_ms", median(cast)}, {"whole_ms", median(whole)}}; }
+    std::vector<double> cast, whole, processor;  // ms; processor: of the whole, all threads
+    Json json() const {
+        return {{"cast_ms", median(cast)}, {"whole_ms", median(whole)}, {"processor_ms", median(processor)}};
+    }
 };
 
 /// A way of ours to render a scene.
@@ -42,11 +45,13 @@ struct Case {
 Rendering timed(const Scene& scene, const std::shared_ptr<const Volume>& volume, int frame, int threads,
                 Times& times) {
     const Stopwatch watch;
+    const double before = processor_ms();
     const Plan plan = make_plan(scene, volume, frame);
     RenderOptions options;
     options.threads = threads;
     Rendering rendering = render(plan, options);
     times.whole.push_back(watch.ms());
+    times.processor.push_back(processor_ms() - before);
     times.cast.push_back(1000 * rendering.statistics.seconds);
     return rendering;
 }
@@ -103,7 +108,9 @@ Json compare_case(const Case& c, const Settings& settings) {
         peer.render(plan.camera);  // what is built once
         for (int frame = 0; frame < scene.camera.turntable; ++frame) {
             const Camera camera = make_plan(scene, volume, frame).camera;
+            const double before = processor_ms();
             const VtkPeer::Frame theirs = peer.render(camera);
+            vtk.processor.push_back(processor_ms() - before);
             vtk.cast.push_back(theirs.cast_ms), vtk.whole.push_back(theirs.whole_ms);
             if (frame == 0) {
                 const Image part = thinned(theirs.image, every);
@@ -134,6 +141,7 @@ Json compare_case(const Case& c, const Settings& settings) {
             mine.update(details[i]);
             mine["first_ms"] = first_frame_of_ours(scene_of(c, ours[i].overrides, settings), *volume, n);
             mine["times_faster"] = median(ratios(vtk.cast, ours[i].one_run.cast));
+            mine["times_faster_processor"] = median(ratios(vtk.processor, ours[i].one_run.processor));
             mine["times_faster_whole"] = median(ratios(vtk.whole, ours[i].one_run.whole));
         }
         run["load"] = load();
@@ -196,12 +204,12 @@ int main(int argc, char** argv) try {
                              {"size", "800"},
                              {"every", "4"}});
     if (!has_data()) throw InputError("SQUINT_DATA: names no folder with the volumes of configs/bench");
-    Json result{{"machine", machine()}, {"fog", fog(settings)}, {"cases", Json::array()}};
+    print_line({{"machine", machine()}});
+    print_line({{"fog", fog(settings)}});
     for (const std::string& name : settings.list("scenes"))
         for (const double lit : settings.numbers("lit"))
             for (const double step : settings.numbers("steps"))
-                result["cases"].push_back(compare_case({name, lit != 0, step}, settings));
-    std::fputs((result.dump(2) + "\n").c_str(), stdout);
+                print_line({{"case", compare_case({name, lit != 0, step}, settings)}});
     return 0;
 } catch (const InputError& error) {
     std::fputs(fmt::format("{}\n", error.what()).c_str(), stderr);

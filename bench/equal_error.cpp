@@ -1,0 +1,173 @@
+// Speed at equal error, the figure that counts: how long each method, and VTK where it was built, takes to
+// come within 40 and 50 dB (foreground PSNR) of the reference.  Each is run at ever smaller steps; between
+// two of them the time is interpolated, geometrically.  Progress on standard error, JSON on standard output;
+// bench/tables.py equal-error makes a table of it.
+//
+//     bench_equal_error [scenes=phantom_128,cthead_translucent,...] [lit=0] [threads=1] [size=800] [every=8]
+//     [repeats=3]
+//                       [finest=0.03125]
+#include "bench/support/support.h"
+#include "core/error.h"
+#ifdef SQUINT_HAS_VTK
+#include "bench/peers/vtk/vtk_peer.h"
+#endif
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+#include <optional>
+
+namespace {
+
+using namespace squint;
+using namespace squint::bench;
+
+struct Contender {
+    std::string name;
+    std::vector<std::string> overrides;
+    bool vtk = false;
+};
+
+const std::vector<Contender>& contenders() {
+    static const std::vector<Contender> all{
+#ifdef SQUINT_HAS_VTK
+        {"vtk", {}, true},
+#endif
+        {"pc", {}},
+        {"pc_mid", {"classification.method=pc_mid"}},
+        {"pi2d", {"classification.method=pi2d"}},
+        {"pi1d", {"classification.method=pi1d"}},
+        {"pips", {"classification.method=pips"}},
+    };
+    return all;
+}
+
+struct Point {
+    double step = 1, ms = 0, processor_ms = 0, psnr = 0;
+};
+
+struct Shot {
+    Image image;
+    double ms = 0, processor_ms = 0;
+};
+
+/// Renders again and again with what is kept kept: the median, ray cast alone.
+template <class R>
+Shot median_of(int repeats, R&& render_once) {
+    std::vector<double> ms, processor;
+    Shot last = render_once();
+    for (int i = 0; i < repeats; ++i) {
+        const double before = processor_ms();
+        last = render_once();
+        ms.push_back(last.ms), processor.push_back(processor_ms() - before);
+    }
+    last.ms = median(ms), last.processor_ms = median(processor);
+    return last;
+}
+
+Shot shoot(const Contender& contender, const Plan& plan, int threads, int repeats) {
+#ifdef SQUINT_HAS_VTK
+    if (contender.vtk) {
+        VtkPeer peer(plan, threads);
+        return median_of(repeats, [&] {
+            VtkPeer::Frame frame = peer.render(plan.camera);
+            return Shot{std::move(frame.image), frame.cast_ms};
+        });
+    }
+#endif
+    (void)contender;
+    RenderOptions options;
+    options.threads = threads;
+    return median_of(repeats, [&] {
+        Rendering rendering = render(plan, options);
+        return Shot{std::move(rendering.image), 1000 * rendering.statistics.seconds};
+    });
+}
+
+/// Where the error first falls to `psnr` going from coarse to fine; none when it never does.
+std::optional<double> ms_at(const std::vector<Point>& points, double psnr, double Point::*time) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        if (points[i].psnr < psnr) continue;
+        if (i == 0) return points[0].*time;  // the coarsest step will do
+        const Point &coarse = points[i - 1], &fine = points[i];
+        const double part = (psnr - coarse.psnr) / (fine.psnr - coarse.psnr);
+        return std::exp(std::log(coarse.*time) + part * (std::log(fine.*time) - std::log(coarse.*time)));
+    }
+    return {};
+}
+
+Json or_null(const std::optional<double>& value) {
+    return value ? Json(*value) : Json();
+}
+
+Scene scene_of(const std::string& name, bool lit, const std::vector<std::string>& overrides) {
+    return name.starts_with("phantom_") ? phantom_scene(std::stoll(name.substr(8)), lit, overrides)
+                                        : data_scene(name, lit, overrides);
+}
+
+Json run(const std::string& name, bool lit, const Contender& contender, const Settings& settings) {
+    const int every = static_cast<int>(settings.number("every"));
+    std::vector<Point> points;
+    Json list = Json::array();
+    // Past 50 dB there is nothing left to find; an error that grows again (VTK's) ends the search too.
+    for (double step = 4; step >= settings.number("finest"); step /= 2) {
+        std::vector<std::string> overrides = contender.overrides;
+        overrides.push_back(fmt::format("sampling.step={}", step));
+        for (const char* side : {"width", "height"})
+            overrides.push_back(fmt::format("image.{}={}", side, settings.number("size")));
+        const Scene scene = scene_of(name, lit, overrides);
+        const Plan plan = make_plan(scene, volume_of(scene));
+        const Image reference = thinned_reference(plan, 0, every);
+        const Shot shot = shoot(contender, plan, static_cast<int>(settings.number("threads")),
+                                static_cast<int>(settings.number("repeats")));
+        points.push_back({step, shot.ms, shot.processor_ms, psnr(thinned(shot.image, every), reference)});
+        const Point& p = points.back();
+        list.push_back({{"step", step}, {"ms", p.ms}, {"processor_ms", p.processor_ms}, {"psnr", p.psnr}});
+        std::fputs(fmt::format("{:22} {:5} {:7} step {:<8} {:9.1f} ms  {:6.2f} dB  load {:.1f}\n", name,
+                               lit ? "lit" : "unlit", contender.name, step, p.ms, p.psnr, load())
+                       .c_str(),
+                   stderr);
+        if (p.psnr >= 50) break;
+        if (points.size() >= 3 && p.psnr < points[points.size() - 2].psnr - 1) break;
+    }
+    return {{"name", contender.name},
+            {"ms_40", or_null(ms_at(points, 40, &Point::ms))},
+            {"ms_50", or_null(ms_at(points, 50, &Point::ms))},
+            {"processor_ms_40", or_null(ms_at(points, 40, &Point::processor_ms))},
+            {"processor_ms_50", or_null(ms_at(points, 50, &Point::processor_ms))},
+            {"points", list}};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+    const Settings settings(
+        argc, argv,
+        {{"scenes", has_data() ? "cthead_opaque,cthead_translucent,bonsai_translucent,engine_"
+                                 "opaque,engine_translucent,aneurism_opaque"
+                               : "phantom_128"},
+         {"lit", "0"},
+         {"threads", "1"},
+         {"size", "800"},
+         {"every", "8"},
+         {"repeats", "3"},
+         {"finest", "0.03125"}});
+    print_line({{"machine", machine()}});
+    for (const std::string& name : settings.list("scenes"))
+        for (const double lit : settings.numbers("lit")) {
+            Json scene{{"scene", name}, {"lit", lit != 0}, {"contenders", Json::array()}};
+            for (const Contender& contender : contenders()) try {
+                    scene["contenders"].push_back(run(name, lit != 0, contender, settings));
+                } catch (const InputError& error) {
+                    std::fputs(fmt::format("{}: left out: {}\n", contender.name, error.what()).c_str(),
+                               stderr);
+                }
+            scene["load"] = load();
+            print_line({{"case", scene}});
+        }
+    return 0;
+} catch (const InputError& error) {
+    std::fputs(fmt::format("{}\n", error.what()).c_str(), stderr);
+    return 2;
+}
