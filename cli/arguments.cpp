@@ -278,6 +278,27 @@ void add_doctor(CLI::App& app, DoctorArguments& a) {
     verb.footer("Example:\n  squint doctor");
 }
 
+void add_hard(CLI::App& app, HardArguments& a) {
+    CLI::App& verb = *app.add_subcommand(
+        "hard", "Classify hard transfer functions with every method: errors against the exact integral");
+    verb.add_option("scenes", a.scenes, "Scene files, and folders of them")
+        ->type_name("SCENE.toml|FOLDER")
+        ->required();
+    add_set(verb, a.overrides, "Set a key of every scene; may be repeated, the last wins");
+    add_json_flag(verb, a.json);
+    verb.footer("Example:\n  squint hard configs/hard --set precision.preset=wide");
+}
+
+void add_table(CLI::App& app, TableArguments& a) {
+    CLI::App& verb = *app.add_subcommand("table", "Write the tables of a scene's classification method");
+    add_scene(verb, a.scene);
+    verb.add_option("-o,--output", a.output,
+                    "pi2d: EXR, row = front, column = back; the others: CSV, a row an entry, raw words")
+        ->required()
+        ->type_name("OUT.exr|OUT.csv");
+    verb.footer("Example:\n  squint table head.toml --set classification.method=pi2d -o table.exr");
+}
+
 /// CLI11's messages on one line, with where to look.
 std::string one_line(std::string message, const std::string& verb) {
     std::replace(message.begin(), message.end(), '\n', ' ');
@@ -300,6 +321,8 @@ Arguments parse(int argc, char** argv) {
     InfoArguments info;
     VolumeArguments volume;
     DoctorArguments doctor;
+    HardArguments hard;
+    TableArguments table;
     add_render(app, render);
     add_plan(app, plan);
     add_pixel(app, pixel);
@@ -308,6 +331,8 @@ Arguments parse(int argc, char** argv) {
     add_info(app, info);
     add_volume(app, volume);
     add_doctor(app, doctor);
+    add_hard(app, hard);
+    add_table(app, table);
     std::string about;
     CLI::App& help = *app.add_subcommand("help", "Show this help, or a verb's");
     help.add_option("verb", about, "A verb")->type_name("VERB");

@@ -59,12 +59,22 @@ struct VolumeArguments {
 struct DoctorArguments {
     bool json = false;
 };
+struct HardArguments {
+    std::vector<std::string> scenes;  // files and folders
+    std::vector<std::string> overrides;
+    bool json = false;
+};
+struct TableArguments {
+    SceneArguments scene;
+    std::string output;
+};
 struct Text {  // help, version: printed, done
     std::string text;
 };
 
-using Arguments = std::variant<RenderArguments, PlanArguments, PixelArguments, NumberArguments,
-                               CompareArguments, InfoArguments, VolumeArguments, DoctorArguments, Text>;
+using Arguments =
+    std::variant<RenderArguments, PlanArguments, PixelArguments, NumberArguments, CompareArguments,
+                 InfoArguments, VolumeArguments, DoctorArguments, HardArguments, TableArguments, Text>;
 
 /// Throws InputError: what was found and where help is.
 Arguments parse(int argc, char** argv);
@@ -78,6 +88,8 @@ int run(const CompareArguments& arguments);
 int run(const InfoArguments& arguments);
 int run(const VolumeArguments& arguments);
 int run(const DoctorArguments& arguments);
+int run(const HardArguments& arguments);
+int run(const TableArguments& arguments);
 int run(const Text& text);
 
 }  // namespace squint::cli

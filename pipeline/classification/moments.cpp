@@ -14,6 +14,7 @@ namespace squint {
 namespace {
 
 constexpr int kMostRows = 8192;  // sub-entries: above, the tables outgrow the caches by far
+constexpr std::int64_t kMostValues = 8 << 20;
 constexpr int kInverseBits = 24;
 
 /// One entry of the tables: its depth, and its light in every channel.
@@ -80,6 +81,11 @@ void fill_moments(MomentSeries& m, const Entries& fine, const Spec& spec) {
         m.levels.set_raw(l, 0, rows);
         rows += (count / (1 << l) + 1) * ((2 << l) + 1);
     }
+    if (std::int64_t{rows} * (1 + 3 * m.order) > kMostValues)
+        throw InputError(fmt::format(
+            "classification.order: moments of order {} over {} entries take {} MiB of words, and {} are "
+            "allowed: take pips of order 1, or fewer transfer_function.entries",
+            m.order, fine.size(), std::int64_t{rows} * (1 + 3 * m.order) >> 18, kMostValues >> 18));
     m.moments = Table(rows, 1 + 3 * m.order);
     for (int l = 0; l < levels; ++l)
         for (int block = 0; block <= count >> l; ++block) {

@@ -149,7 +149,7 @@ HWY_INLINE Powers<W> legendre_moments(const MomentSeries& m, const Powers<W>& me
 
 /// The straight colour of the piece between two inputs, `depth` deep.
 template <class W>
-HWY_INLINE std::array<W, 3> series_color(const MomentSeries& m, W near, W far, W depth) {
+HWY_NOINLINE std::array<W, 3> series_color(const MomentSeries& m, W near, W far, W depth) {
     const W zero = constant<W>(0), one = constant<W>(std::int64_t{1} << m.word_fraction);
     // The level whose block holds both ends.
     const EntryPosition<W> low = sub_entry_position(m, min(near, far)),
@@ -206,7 +206,7 @@ HWY_INLINE std::array<W, 3> series_color(const MomentSeries& m, W near, W far, W
 
 /// The input at which T reaches `target`: the entry by bisection, straight inside it.
 template <class W>
-HWY_INLINE W input_at_depth(const MomentSeries& m, W target) {
+HWY_NOINLINE W input_at_depth(const MomentSeries& m, W target) {
     const EntryLookup& e = m.prefix.entries;
     const W last = constant<W>(e.last_segment);
     W entry = constant<W>(0);
@@ -225,7 +225,7 @@ HWY_INLINE W input_at_depth(const MomentSeries& m, W target) {
 
 /// The straight colour of a slab in kPieces pieces of equal depth, none but the last deeper than the limit.
 template <class W>
-HWY_INLINE std::array<W, 3> color_in_pieces(const MomentSeries& m, const CutSlab<W>& cut, W front, W length,
+HWY_NOINLINE std::array<W, 3> color_in_pieces(const MomentSeries& m, const CutSlab<W>& cut, W front, W length,
                                             const SlabDepth<W>& whole) {
     const PrefixLookup& p = m.prefix;
     const W zero = constant<W>(0), one = constant<W>(p.entries.one_alpha);

@@ -1,0 +1,107 @@
+// squint hard: scenes whose transfer functions are hard to classify, each with every method: the error of one
+// slab against the exact integral, or why a method is refused.
+#include "cli/common.h"
+#include "core/error.h"
+#include "pipeline/slab_check.h"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <filesystem>
+
+namespace squint::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+/// Scene files as given, and those of folders in order of name.
+std::vector<std::string> scenes_of(const std::vector<std::string>& names) {
+    std::vector<std::string> scenes;
+    for (const std::string& name : names) {
+        if (!fs::exists(name)) throw InputError(name + ": no such file or folder");
+        if (!fs::is_directory(name)) {
+            scenes.push_back(name);
+            continue;
+        }
+        std::vector<std::string> found;
+        for (const auto& entry : fs::directory_iterator(name))
+            if (entry.path().extension() == ".toml") found.push_back(entry.path().string());
+        std::sort(found.begin(), found.end());
+        if (found.empty()) throw InputError(name + ": no .toml scene in this folder");
+        scenes.insert(scenes.end(), found.begin(), found.end());
+    }
+    return scenes;
+}
+
+struct Outcome {
+    SlabCheck check;
+    std::string refused;             // why, or empty
+    std::vector<std::string> notes;  // what the builder decided
+};
+Outcome outcome_of(Scene scene, const NamedMethod& method, const std::shared_ptr<const Volume>& volume) {
+    scene.classification.method = method.method, scene.classification.order = method.order;
+    Outcome outcome;
+    try {
+        const Plan plan = make_plan(scene, volume);
+        outcome.check = check_slabs(plan), outcome.notes = plan.notes;
+    } catch (const InputError& error) {
+        outcome.refused = error.what();
+    }
+    return outcome;
+}
+
+std::string cell_of(const Outcome& outcome) {
+    if (!outcome.refused.empty()) return "refused";
+    return fmt::format("{:.2f}{}", std::max(outcome.check.largest_color, outcome.check.largest_alpha),
+                       outcome.check.beyond ? "!" : "");
+}
+Json json_of(const Outcome& outcome) {
+    if (!outcome.refused.empty()) return {{"refused", outcome.refused}};
+    return {{"slabs", outcome.check.slabs},
+            {"color_lsb8", outcome.check.largest_color},
+            {"alpha_lsb8", outcome.check.largest_alpha},
+            {"outside_0_C_alpha_1", outcome.check.beyond},
+            {"notes", outcome.notes}};
+}
+
+}  // namespace
+
+int run(const HardArguments& a) {
+    const std::vector<NamedMethod> methods = every_method();
+    std::vector<std::vector<std::string>> rows{{"scene"}};
+    for (const NamedMethod& method : methods) rows[0].push_back(method.name);
+    Json json = Json::object();
+    std::string remarks;
+    int beyond = 0;
+    for (const std::string& file : scenes_of(a.scenes)) {
+        const Scene scene = read({file, a.overrides});
+        std::vector<std::string> notes;
+        const auto volume = load(scene, notes);
+        const std::string name = fs::path(file).stem().string();
+        rows.push_back({name});
+        for (const NamedMethod& method : methods) {
+            const Outcome outcome = outcome_of(scene, method, volume);
+            rows.back().push_back(cell_of(outcome));
+            json[name][method.name] = json_of(outcome);
+            beyond += outcome.check.beyond;
+            if (!outcome.refused.empty())
+                remarks += fmt::format("{}, {}: {}\n", name, method.name, outcome.refused);
+            for (const std::string& note : outcome.notes)
+                if (note.find("redirected") != std::string::npos)
+                    remarks += fmt::format("{}: {}\n", name, note);
+        }
+    }
+    if (a.json) {
+        print_json({{"schema", "squint.hard/1"}, {"scenes", json}});
+    } else {
+        print(
+            "Largest error of one slab against the exact integral, colour or opacity, in LSB8 (! outside "
+            "0 <= C <= alpha <= 1)\n\n" +
+            table_text(rows) + (remarks.empty() ? "" : "\n" + remarks));
+    }
+    return beyond ? kComparisonFailed : kDone;
+}
+
+}  // namespace squint::cli
