@@ -365,6 +365,8 @@ Arguments parse(int argc, char** argv) {
     if (verb == "info") return info;
     if (verb == "volume") return volume;
     if (verb == "doctor") return doctor;
+    if (verb == "hard") return hard;
+    if (verb == "table") return table;
     if (verb == "help" && !about.empty()) {
         const auto of = app.get_subcommands([&](const CLI::App* each) { return each->get_name() == about; });
         if (of.empty()) throw InputError(fmt::format("help: no verb \"{}\"; squint help lists them", about));
