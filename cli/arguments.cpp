@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <charconv>
 #include <map>
+#include <tuple>
 
 namespace squint::cli {
 namespace {
@@ -299,6 +300,65 @@ void add_table(CLI::App& app, TableArguments& a) {
     verb.footer("Example:\n  squint table head.toml --set classification.method=pi2d -o table.exr");
 }
 
+void add_sweep(CLI::App& app, SweepArguments& a) {
+    CLI::App& verb = *app.add_subcommand(
+        "sweep", "Render every point of a sweep file and measure its error, time and bits");
+    verb.add_option("files", a.files, "Sweep file; with --collect the folders to join")
+        ->required()
+        ->type_name("SWEEP.toml");
+    verb.add_option("-o,--output", a.output,
+                    "Folder for the results; points that are there are not computed again")
+        ->type_name("RUN")
+        ->capture_default_str();
+    add_set(verb, a.overrides, "Set any key of the scene at every point; an axis of that key still wins");
+    verb.add_option_function<std::string>(
+            "--shard",
+            [&](const std::string& text) {
+                constexpr const char* kAllowed = "I/N, as in 1/4, with I from 1 to N";
+                std::tie(a.shard, a.shards) = pair_of(text, '/', "--shard", kAllowed);
+                if (a.shard < 1 || a.shards < a.shard)
+                    throw InputError(fmt::format("--shard: found \"{}\"; allowed: {}", text, kAllowed));
+            },
+            "Compute only every N-th point, beginning with the I-th")
+        ->type_name("I/N");
+    verb.add_flag("--collect", a.collect, "Join the folders of shards into one");
+    verb.add_flag("--dry-run", a.dry_run, "Print the points and an estimate of the time, and stop");
+    verb.add_flag("--redo", a.redo, "Compute points again that are there");
+    verb.add_option("--threads", a.threads,
+                    "Points at a time; threads of a point that is timed; default: one a processor")
+        ->check(CLI::Range(1, 4096))
+        ->type_name("N");
+    verb.add_flag("--json-lines", a.json_lines,
+                  "Print the record of each point as it is finished, a line each");
+    verb.add_flag("-q,--quiet", a.quiet, "No progress, no summary");
+    verb.footer(
+        "A killed run goes on where it was when the same command is given again.  Exit code 3: some points "
+        "failed.\n\n"
+        "Examples:\n"
+        "  squint sweep configs/sweeps/compositing.toml -o run && squint report run -o report.html\n"
+        "  squint sweep head.toml --dry-run --set image.width=256 --set image.height=256\n"
+        "  squint sweep head.toml --shard 2/8 -o piece2; squint sweep --collect piece* -o run");
+}
+
+/// The command as a shell would take it.
+std::string command_text(int argc, char** argv) {
+    std::string text = "squint";
+    for (int i = 1; i < argc; ++i) {
+        const std::string word = argv[i];
+        const bool plain =
+            !word.empty() && word.find_first_of(" '\"$&;()[]{}*?<>|\\`!#~\n\t") == std::string::npos;
+        text += ' ';
+        if (plain) {
+            text += word;
+            continue;
+        }
+        text += '\'';
+        for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+        text += '\'';
+    }
+    return text;
+}
+
 /// CLI11's messages on one line, with where to look.
 std::string one_line(std::string message, const std::string& verb) {
     std::replace(message.begin(), message.end(), '\n', ' ');
@@ -323,6 +383,7 @@ Arguments parse(int argc, char** argv) {
     DoctorArguments doctor;
     HardArguments hard;
     TableArguments table;
+    SweepArguments sweep;
     add_render(app, render);
     add_plan(app, plan);
     add_pixel(app, pixel);
@@ -333,6 +394,7 @@ Arguments parse(int argc, char** argv) {
     add_doctor(app, doctor);
     add_hard(app, hard);
     add_table(app, table);
+    add_sweep(app, sweep);
     std::string about;
     CLI::App& help = *app.add_subcommand("help", "Show this help, or a verb's");
     help.add_option("verb", about, "A verb")->type_name("VERB");
@@ -340,7 +402,8 @@ Arguments parse(int argc, char** argv) {
     app.footer(
         "`squint VERB --help` has every flag and an example; `squint render --scene-reference` every key of "
         "a scene.\n"
-        "Exit codes: 0 done, 1 a comparison failed, 2 usage or input, 70 internal error, 130 interrupted.\n\n"
+        "Exit codes: 0 done, 1 a comparison failed, 2 usage or input, 3 some points failed, 70 internal "
+        "error, 130 interrupted.\n\n"
         "Example:\n  squint render -o out.exr --preview out.png");
 
     const auto chosen = [&]() -> std::string {
@@ -367,6 +430,7 @@ Arguments parse(int argc, char** argv) {
     if (verb == "doctor") return doctor;
     if (verb == "hard") return hard;
     if (verb == "table") return table;
+    if (verb == "sweep") return sweep.command = command_text(argc, argv), sweep;
     if (verb == "help" && !about.empty()) {
         const auto of = app.get_subcommands([&](const CLI::App* each) { return each->get_name() == about; });
         if (of.empty()) throw InputError(fmt::format("help: no verb \"{}\"; squint help lists them", about));

@@ -68,13 +68,21 @@ struct TableArguments {
     SceneArguments scene;
     std::string output;
 };
+struct SweepArguments {
+    std::vector<std::string> files;  // the sweep, or with collect the folders to join
+    std::vector<std::string> overrides;
+    std::string output = "run";
+    std::string command;  // as typed, for the record
+    int shard = 1, shards = 1, threads = 0;
+    bool collect = false, dry_run = false, redo = false, json_lines = false, quiet = false;
+};
 struct Text {  // help, version: printed, done
     std::string text;
 };
 
-using Arguments =
-    std::variant<RenderArguments, PlanArguments, PixelArguments, NumberArguments, CompareArguments,
-                 InfoArguments, VolumeArguments, DoctorArguments, HardArguments, TableArguments, Text>;
+using Arguments = std::variant<RenderArguments, PlanArguments, PixelArguments, NumberArguments,
+                               CompareArguments, InfoArguments, VolumeArguments, DoctorArguments,
+                               HardArguments, TableArguments, SweepArguments, Text>;
 
 /// Throws InputError: what was found and where help is.
 Arguments parse(int argc, char** argv);
@@ -90,6 +98,7 @@ int run(const VolumeArguments& arguments);
 int run(const DoctorArguments& arguments);
 int run(const HardArguments& arguments);
 int run(const TableArguments& arguments);
+int run(const SweepArguments& arguments);
 int run(const Text& text);
 
 }  // namespace squint::cli

@@ -14,7 +14,8 @@
 
 namespace squint::cli {
 
-inline constexpr int kDone = 0, kComparisonFailed = 1, kUsage = 2, kInternal = 70, kInterrupted = 130;
+inline constexpr int kDone = 0, kComparisonFailed = 1, kUsage = 2, kSomeFailed = 3, kInternal = 70,
+                     kInterrupted = 130;
 
 /// Writes to standard output.  Throws InputError when it cannot be written.
 void print(std::string_view text);
