@@ -152,15 +152,17 @@ void plan_location(Plan& plan) {
     s.to_first = Rescale(s.location_fraction, s.location, wire_index(Wire::location));
     s.to_direction = Rescale(s.direction_fraction, s.direction, wire_index(Wire::direction));
     s.to_length = rescale(plan, s.length_fraction, Wire::length);
-    // Rounding V by half a last bit moves sample k by k halves: so far can P0 + kV leave the box.
-    const auto drift = static_cast<std::int64_t>(most_steps(plan) / 2 + 2)
-                       << (s.common_fraction - s.direction_fraction);
+    // Dropping less than a last bit of V moves sample k by less than k of them, and P0 has lost its own: so
+    // far can P0 + kV leave the box.
+    const auto drift =
+        (static_cast<std::int64_t>(most_steps(plan) + 4) << (s.common_fraction - s.direction_fraction)) +
+        (std::int64_t{1} << (s.common_fraction - s.location_fraction));
     for (int axis = 0; axis < 3; ++axis) {
         const auto a = static_cast<std::size_t>(axis);
         s.limit[a] = (v.dims[axis] - 1) << s.location_fraction;
         s.last_cell[a] = std::max<std::int64_t>(v.dims[axis] - 2, 0);
-        s.low[a] = -2 * drift;
-        s.high[a] = (s.limit[a] << (s.common_fraction - s.location_fraction)) + 2 * drift;
+        s.low[a] = -drift;
+        s.high[a] = (s.limit[a] << (s.common_fraction - s.location_fraction)) + drift;
     }
 }
 

@@ -5,6 +5,7 @@
 #include "core/procedural.h"
 #include "fixedpoint/words.h"
 #include "pipeline/location.h"
+#include "pipeline/raycast.h"
 #include "pipeline/render.h"
 
 #include <gtest/gtest.h>
@@ -266,6 +267,76 @@ TEST(SampleLocation, CellAndWeightGiveTheLocationBack) {
         ASSERT_EQ((position.cell[0] << 6) + position.weight[0], location);
         ASSERT_LE(position.weight[0], 64);
         ASSERT_LE(position.cell[0], 10);
+    }
+}
+
+/// A view of a box of uneven sides and spacings in any formats.
+Plan random_plan(std::mt19937_64& random) {
+    const auto between = [&](int low, int high) {
+        return low + static_cast<int>(random() % static_cast<std::uint64_t>(high - low + 1));
+    };
+    const auto real = [&](double low, double high) {
+        return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
+    };
+    Scene scene = cube_scene(Vec3(real(-1, 1), real(-1, 1), real(-1, 1) + 0.01), real(0.05, 3));
+    scene.camera.projection = static_cast<Projection>(random() % 2);
+    scene.camera.height.reset();
+    scene.image.width = scene.image.height = 4;
+    scene.sampling.position = static_cast<PositionRule>(random() % 2);
+    const auto wire = [&](Wire w, const Format& format) {
+        const Spec spec{format, static_cast<Rounding>(random() % 4), Overflow::sat};
+        scene.precision.override_[static_cast<std::size_t>(w)] = to_string(spec);
+    };
+    wire(Wire::location, {between(6, 8), between(0, 24), false});
+    wire(Wire::direction, {between(2, 3), between(4, 24), true});
+    const Index3 dims(between(2, 64), between(2, 64), between(2, 64));
+    const Vec3 spacing(real(0.4, 2), real(0.4, 2), real(0.4, 2));
+    return make_plan(scene,
+                     std::make_shared<Volume>(make_procedural(*find_procedural("ramp"), dims, 8, spacing)));
+}
+
+// What the plan counts on: P0 + kV stays in its bounds, and the intervals hold what comes of it.
+TEST(SampleLocation, IntervalsHoldEveryLocationCellAndWeight) {
+    std::mt19937_64 random(3);
+    for (int i = 0; i < 400; ++i) {
+        const Plan plan = random_plan(random);
+        const LocationStage& s = plan.location;
+        for (int row = 0; row < 4; ++row)
+            for (int column = 0; column < 4; ++column) {
+                const RaySetup setup = plan.set_up(column, row);
+                const RayWords<Word> ray = ray_words<Word>(plan, setup);
+                RayWords<Range> rays{};
+                for (std::size_t a = 0; a < 3; ++a) {
+                    rays.first[a] = rays.last[a] = {0, s.limit[a]};
+                    rays.step[a] = {s.direction.format.smallest(), s.direction.format.largest()};
+                }
+                const Range samples{0, setup.last_index};
+                rays.last_index = samples;
+                std::array<Range, 3> locations;
+                for (int a = 0; a < 3; ++a)
+                    locations[static_cast<std::size_t>(a)] = locate(s, rays, samples, a);
+                const CellPosition<Range> positions = cell_position(s, locations);
+                for (Word k = 0; k < setup.last_index; ++k) {
+                    std::array<Word, 3> location;
+                    for (std::size_t a = 0; a < 3; ++a) {
+                        const Int128 exact =
+                            (Int128{ray.first[a]} << (s.common_fraction - s.location_fraction)) +
+                            (Int128{k * ray.step[a]} << (s.common_fraction - s.direction_fraction));
+                        ASSERT_TRUE(s.low[a] <= exact && exact <= s.high[a])
+                            << to_string(s.location) << ", " << to_string(s.direction) << ", sample " << k
+                            << " of " << setup.slabs;
+                        location[a] = locate(s, ray, k, static_cast<int>(a));
+                        ASSERT_TRUE(locations[a].low <= location[a] && location[a] <= locations[a].high);
+                    }
+                    const CellPosition<Word> position = cell_position(s, location);
+                    for (std::size_t a = 0; a < 3; ++a) {
+                        ASSERT_TRUE(positions.cell[a].low <= position.cell[a] &&
+                                    position.cell[a] <= positions.cell[a].high);
+                        ASSERT_TRUE(positions.weight[a].low <= position.weight[a] &&
+                                    position.weight[a] <= positions.weight[a].high);
+                    }
+                }
+            }
     }
 }
 
