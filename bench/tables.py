@@ -130,7 +130,7 @@ def medians(result):
     """Name -> figures: the medians of repetitions where there are any."""
     runs = {}
     for run in result["benchmarks"]:
-        if run.get("run_type") == "iteration":
+        if run.get("run_type") == "iteration" and not run.get("error_occurred"):
             runs.setdefault(run["name"].replace("/process_time/manual_time", ""), []).append(run)
     keys = ("real_time", "cpu_time", "at", "ns_per_sample", "psnr", "peak_mib", "setup_ms", "whole_ms", "load")
     return {name: {k: statistics.median(r[k] for r in list_) for k in keys if k in list_[0]}
