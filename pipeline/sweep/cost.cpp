@@ -59,7 +59,7 @@ bool premultiplied(const Plan& plan) {
     return plan.shading.premultiplied;
 }
 bool straight(const Plan& plan) {  // the form multiplies colour by w instead of carrying it premultiplied
-    return plan.scene.compositing.form == CompositingForm::w && !premultiplied(plan);
+    return plan.compositing.form == CompositingForm::w && !premultiplied(plan);
 }
 
 std::vector<Wire> wires_of_stage(const Plan& plan, std::size_t stage) {
@@ -89,7 +89,7 @@ std::vector<Wire> wires_of_stage(const Plan& plan, std::size_t stage) {
             return {Wire::light, Wire::dot, Wire::power, Wire::material, Wire::intensity, Wire::lit_color};
         default:
             wires = {Wire::color, Wire::transparency};
-            if (plan.scene.compositing.form == CompositingForm::w) wires.push_back(Wire::contribution);
+            if (plan.compositing.form == CompositingForm::w) wires.push_back(Wire::contribution);
             return wires;
     }
 }

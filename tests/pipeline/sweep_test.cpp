@@ -146,7 +146,7 @@ TEST(SweepPoint, IsCalledBySpecsAndNotByTheWayTheyAreWritten) {
 }
 
 TEST(SweepPoint, IsCalledByItsDataToo) {
-    const auto points = prepared(parsed(kTiny + "[[axis]]\nkey = 'volume.seed'\nvalues = [1, 2]\n[[axis]]\n"
+    const auto points = prepared(parsed(kTiny + "[[axis]]\nkey = 'volume.bits'\nvalues = [8, 10]\n[[axis]]\n"
                                                 "key = 'volume.spacing'\nvalues = [[1, 1, 1], [1, 1, 2]]\n"));
     std::set<std::string> hashes;
     for (const Prepared& point : points) hashes.insert(point.hash);
@@ -171,7 +171,7 @@ TEST(SweepPoint, MeasuresNoErrorWhereNothingIsRounded) {
 // White fog: C + T is one at every step of the w form, and truncating equation 9 loses some (MATH.md C1).
 TEST(SweepPoint, SeesThatTheWFormConservesAndEquation9DoesNot) {
     const SweepFile sweep = parsed(
-        kTiny +
+        "[base]\nimage.width = 8\nimage.height = 8\nlights = []\n"
         "volume.procedural = 'fog'\nvolume.dims = 64\ncamera.height = 60\ntransfer_function.unit_distance = "
         "1\n"
         "transfer_function.points = [[0, 1, 1, 1, 0.004], [255, 1, 1, 1, 0.004]]\nsampling.termination = 0\n"
@@ -222,9 +222,9 @@ TEST(SweepCost, IsTheSumOfWidthsAndOfProductsOfOperandWidths) {
     // Three lerp levels of u12.12; voxels of 8 bits and a sign, then 24 bits and a sign, by a weight of 13.
     EXPECT_EQ(cost.stages[1].word_bits, 3 * 24);
     EXPECT_EQ(cost.stages[1].multiplier_bits, (4 * 9 + 2 * 25 + 25) * 13);
-    // w = alpha T, C += c w in words of 16 bits.
-    EXPECT_EQ(cost.stages[3].word_bits, 3 * 16);
-    EXPECT_EQ(cost.stages[3].multiplier_bits, 4 * 16 * 16);
+    // Equation 9 in words of 16 bits: c alpha and C_s T for three colours, T (1 - alpha); wires C and T.
+    EXPECT_EQ(cost.stages[3].word_bits, 2 * 16);
+    EXPECT_EQ(cost.stages[3].multiplier_bits, 7 * 16 * 16);
     EXPECT_EQ(cost.pixel_bits, 4 * 16);
     EXPECT_EQ(cost.voxel_bytes, 8);
     std::int64_t words = 0, multipliers = 0;
