@@ -171,6 +171,7 @@ MomentSeries build_moment_series(const ClassificationInputs& in) {
     const Spec word{{1, m.word_fraction, false}, moment.rounding, Overflow::sat};
     fill_moments(m, fine, word);
     m.moments.wire = wire;
+    m.resolved = std::int64_t{1} << (m.word_fraction - std::max(0, m.word_fraction - 10) / m.order);
     m.to_part = Rescale(m.word_fraction + in.input_fraction - m.sub_entry_bits, word, wire);
     m.to_product = Rescale(2 * m.word_fraction, word, wire);
     m.to_mean = Rescale(m.word_fraction + kInverseBits, word, wire);

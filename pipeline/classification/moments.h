@@ -37,8 +37,9 @@ struct MomentSeries {
     int weight_fraction = 18;
     int row_bits = 10;  // rows of `weights` are 2^-row_bits apart
     int depth_fraction = 0;
-    bool splits = false;     // slabs deeper than `limit` are cut (LEG), or take order 1 (PIPS)
-    std::int64_t limit = 0;  // raw, of slab_depth
+    bool splits = false;        // slabs deeper than `limit` are cut (LEG), or take order 1 (PIPS)
+    std::int64_t limit = 0;     // raw, of slab_depth
+    std::int64_t resolved = 0;  // depth in a block, raw, whose powers the words hold to 2^-10
     std::array<std::int64_t, 3> lowest{}, highest{};       // of the entries' colours
     std::array<std::int64_t, kMostMomentOrder> inverse{};  // 2^24 / (k + 1)
     Rescale to_part;                                       // within a sub-entry
@@ -91,44 +92,109 @@ HWY_INLINE EntryPosition<W> sub_entry_position(const MomentSeries& m, W input) {
     return {shift_left(at.entry, bits) + sub, at.fraction - shift_left(sub, fraction)};
 }
 
-/// One end of a slab in its block: the depth there, and what the moments inside its sub-entry need.
+/// One end of a slab in its block: depths from the block's start to its sub-entry's start, to itself, and to
+/// the sub-entry's end.
 template <class W>
 struct MomentEnd {
-    W row, fraction;
-    W depth;           // from the block's start
-    Powers<W> powers;  // mean of t^k between the sub-entry's start and here
+    W row, fraction, start, depth, next;
 };
 template <class W>
 HWY_INLINE MomentEnd<W> moment_end(const MomentSeries& m, W row, W fraction) {
-    MomentEnd<W> end{row, fraction, {}, {}};
-    const W start = gather(m.moments, row, 0), next = gather(m.moments, row + constant<W>(1), 0);
-    end.depth = start + quantise(fraction * (next - start), m.to_part);
-    // mean of t^k over [a, b] is (k b mean_(k-1) + a^k) / (k + 1)
-    const std::int64_t one = std::int64_t{1} << m.word_fraction;
-    W power = constant<W>(one);
-    end.powers[0] = power;
-    for (std::size_t k = 1; k < static_cast<std::size_t>(m.order); ++k) {
-        power = within(quantise(power * start, m.to_product), 0, one);
-        const W longer = within(quantise(end.depth * end.powers[k - 1], m.to_product), 0, one);
-        end.powers[k] =
-            quantise((longer * constant<W>(static_cast<std::int64_t>(k)) + power) * constant<W>(m.inverse[k]),
-                     m.to_mean);
-    }
+    MomentEnd<W> end{
+        row, fraction, gather(m.moments, row, 0), {}, gather(m.moments, row + constant<W>(1), 0)};
+    end.depth = end.start + quantise(fraction * (end.next - end.start), m.to_part);
     return end;
 }
-/// Moments 0 to order - 1 of a channel at an end.
+
+/// A slab as its first sub-entry's part, whole sub-entries and the last one's part, each with its share of
+/// the depth: shares and moments are sums of positive terms, however short the slab is in its block.
 template <class W>
-HWY_INLINE Powers<W> moments_at(const MomentSeries& m, const MomentEnd<W>& end, int channel) {
-    Powers<W> moment;
-    const W start = gather(m.moments, end.row, 1 + channel);
-    const W part = quantise(end.fraction * (gather(m.moments, end.row + constant<W>(1), 1 + channel) - start),
-                            m.to_part);
-    moment[0] = start + part;
-    for (int k = 1; k < m.order; ++k) {
-        const auto at = static_cast<std::size_t>(k);
-        moment[at] =
-            gather(m.moments, end.row, 1 + 3 * k + channel) + quantise(part * end.powers[at], m.to_product);
+struct SlabParts {
+    MomentEnd<W> a, b;
+    W span, whole;  // depths
+    W first_share, whole_share;
+    Powers<W> first_mean, last_mean;  // of y^k over the parts
+    Powers<W> whole_power;            // whole_share^(k + 1)
+};
+/// No wider than one: what the meaning of a word says and intervals do not see.
+template <class W>
+HWY_INLINE W share_of(const MomentSeries& m, W part, W span) {
+    return min(divide(part, span, m.to_share), constant<W>(std::int64_t{1} << m.word_fraction));
+}
+template <class W>
+HWY_INLINE SlabParts<W> slab_parts(const MomentSeries& m, const MomentEnd<W>& a, const MomentEnd<W>& b) {
+    const std::int64_t unit = std::int64_t{1} << m.word_fraction;
+    const W zero = constant<W>(0), one = constant<W>(unit);
+    const auto same = a.row == b.row;
+    const auto product = [&](W x, W y) { return within(quantise(x * y, m.to_product), 0, unit); };
+    SlabParts<W> parts{a, b, {}, {}, {}, {}, {}, {}, {}};
+    const W first = clamp(select(same, b.depth, a.next) - a.depth, zero, one);
+    parts.whole = clamp(select(same, zero, b.start - a.next), zero, one);
+    const W last = clamp(select(same, zero, b.depth - b.start), zero, one);
+    parts.span = within(max(first + parts.whole + last, constant<W>(1)), 1, unit);
+    parts.first_share = share_of(m, first, parts.span);
+    parts.whole_share = share_of(m, parts.whole, parts.span);
+    const W behind = min(parts.first_share + parts.whole_share, one);
+    W first_power = one, behind_power = one, mean = one;
+    parts.whole_power[0] = parts.whole_share;
+    parts.first_mean[0] = parts.last_mean[0] = one;
+    for (std::size_t k = 1; k < static_cast<std::size_t>(m.order); ++k) {
+        const W inverse = constant<W>(m.inverse[k]);
+        first_power = product(first_power, parts.first_share);
+        behind_power = product(behind_power, behind);
+        parts.whole_power[k] = product(parts.whole_power[k - 1], parts.whole_share);
+        parts.first_mean[k] = within(quantise(first_power * inverse, m.to_mean), 0, unit);
+        // The mean of y^k over [b, 1] is (k mean_(k-1) + b^k) / (k + 1).
+        mean = within(
+            quantise((mean * constant<W>(static_cast<std::int64_t>(k)) + behind_power) * inverse, m.to_mean),
+            0, unit);
+        parts.last_mean[k] = mean;
     }
+    return parts;
+}
+
+/// int c y^k dy of a channel, k < order.
+template <class W>
+HWY_INLINE Powers<W> mean_moments(const MomentSeries& m, const SlabParts<W>& p, int channel) {
+    const auto count = static_cast<std::size_t>(m.order);
+    const W zero = constant<W>(0), one = constant<W>(std::int64_t{1} << m.word_fraction);
+    const auto same = p.a.row == p.b.row;
+    const auto light = [&](W row, int k) { return gather(m.moments, row, 1 + 3 * k + channel); };
+    const W a_next_row = p.a.row + constant<W>(1);
+    const W a_start = light(p.a.row, 0), a_next = light(a_next_row, 0), b_start = light(p.b.row, 0);
+    const W a_here = a_start + quantise(p.a.fraction * (a_next - a_start), m.to_part);
+    const W b_here =
+        b_start + quantise(p.b.fraction * (light(p.b.row + constant<W>(1), 0) - b_start), m.to_part);
+    const W first = share_of(m, clamp(select(same, b_here, a_next) - a_here, zero, one), p.span);
+    const W last = share_of(m, clamp(select(same, zero, b_here - b_start), zero, one), p.span);
+
+    // Whole sub-entries, about their own start and over their own depth.
+    Powers<W> moment;
+    moment[0] = clamp(select(same, zero, b_start - a_next), zero, one);
+    for (std::size_t k = 1; k < count; ++k)
+        moment[k] =
+            clamp(light(p.b.row, static_cast<int>(k)) - light(a_next_row, static_cast<int>(k)), zero, one);
+    for (std::size_t pass = 1; pass < count; ++pass)
+        for (std::size_t k = count - 1; k >= pass; --k)
+            moment[k] = clamp(moment[k] - quantise(p.a.next * moment[k - 1], m.to_product), zero, one);
+    const W whole = max(p.whole, constant<W>(1));
+    // Where the words hold too little of a thin part's powers, its colour is its mean.
+    const auto thin = p.whole < constant<W>(m.resolved);
+    for (std::size_t k = 0; k < count; ++k) {
+        for (std::size_t times = 0; times <= k; ++times) moment[k] = share_of(m, moment[k], whole);
+        if (k > 0)
+            moment[k] = select(thin, quantise(moment[0] * constant<W>(m.inverse[k]), m.to_mean), moment[k]);
+    }
+
+    // The three parts, one behind the other.
+    for (std::size_t k = 0; k < count; ++k) moment[k] = quantise(moment[k] * p.whole_power[k], m.to_product);
+    for (std::size_t pass = 1; pass < count; ++pass)
+        for (std::size_t k = count - 1; k >= pass; --k)
+            moment[k] = min(moment[k] + quantise(p.first_share * moment[k - 1], m.to_product), one);
+    for (std::size_t k = 0; k < count; ++k)
+        moment[k] = min(moment[k] + quantise(first * p.first_mean[k], m.to_product) +
+                            quantise(last * p.last_mean[k], m.to_product),
+                        one);
     return moment;
 }
 
@@ -150,7 +216,7 @@ HWY_INLINE Powers<W> legendre_moments(const MomentSeries& m, const Powers<W>& me
 /// The straight colour of the piece between two inputs, `depth` deep.
 template <class W>
 HWY_NOINLINE std::array<W, 3> series_color(const MomentSeries& m, W near, W far, W depth) {
-    const W zero = constant<W>(0), one = constant<W>(std::int64_t{1} << m.word_fraction);
+    const W zero = constant<W>(0);
     // The level whose block holds both ends.
     const EntryPosition<W> low = sub_entry_position(m, min(near, far)),
                            high = sub_entry_position(m, max(near, far));
@@ -161,7 +227,7 @@ HWY_NOINLINE std::array<W, 3> series_color(const MomentSeries& m, W near, W far,
     const W base = gather(m.levels, level, 0) + block + within(shift_by(block, level), 0, last);
     const MomentEnd<W> a = moment_end(m, base + low.entry, low.fraction),
                        b = moment_end(m, base + high.entry, high.fraction);
-    const W span = max(b.depth - a.depth, constant<W>(1));
+    const SlabParts<W> parts = slab_parts(m, a, b);
 
     // Weights between two rows.
     const int fraction = m.depth_fraction - m.row_bits;
@@ -178,19 +244,8 @@ HWY_NOINLINE std::array<W, 3> series_color(const MomentSeries& m, W near, W far,
     const auto deep = constant<W>(m.limit) < depth;
     std::array<W, 3> color;
     for (int c = 0; c < 3; ++c) {
-        const Powers<W> at_a = moments_at(m, a, c), at_b = moments_at(m, b, c);
         const auto count = static_cast<std::size_t>(m.order);
-        Powers<W> mean;
-        for (std::size_t k = 0; k < count; ++k) mean[k] = clamp(at_b[k] - at_a[k], zero, one);
-        // About the lower end: powers of (t - t_a).
-        for (std::size_t pass = 1; pass < count; ++pass)
-            for (std::size_t k = count - 1; k >= pass; --k)
-                mean[k] = clamp(mean[k] - quantise(a.depth * mean[k - 1], m.to_product), zero, one);
-        // Over the slab's own depth.
-        for (std::size_t k = 0; k < count; ++k)
-            for (std::size_t times = 0; times <= k; ++times)
-                mean[k] = min(divide(mean[k], span, m.to_share), one);
-        const Powers<W> moment = legendre_moments(m, mean);
+        const Powers<W> moment = legendre_moments(m, mean_moments(m, parts, c));
         W sum = shift_left(moment[0], m.weight_fraction);
         for (std::size_t j = 1; j < count; ++j) {
             const W seen = j % 2 ? select(descending, zero - moment[j], moment[j]) : moment[j];
@@ -226,7 +281,7 @@ HWY_NOINLINE W input_at_depth(const MomentSeries& m, W target) {
 /// The straight colour of a slab in kPieces pieces of equal depth, none but the last deeper than the limit.
 template <class W>
 HWY_NOINLINE std::array<W, 3> color_in_pieces(const MomentSeries& m, const CutSlab<W>& cut, W front, W length,
-                                            const SlabDepth<W>& whole) {
+                                              const SlabDepth<W>& whole) {
     const PrefixLookup& p = m.prefix;
     const W zero = constant<W>(0), one = constant<W>(p.entries.one_alpha);
     const W share = min(floor_shift(whole.difference, 2), divide(whole.difference * constant<W>(m.limit),
