@@ -35,7 +35,7 @@ std::pair<int, int> pair_of(const std::string& text, char separator, const char*
 }
 
 /// "800M" -> bytes.
-std::int64_t size_of(const std::string& text) {
+std::int64_t size_of(const std::string& text, const std::string& flag) {
     constexpr const char* kAllowed = "a number above 0 with K, M, G or T, as in 500M";
     std::string digits = text;
     if (!digits.empty() && digits.back() == 'B') digits.pop_back();
@@ -43,9 +43,9 @@ std::int64_t size_of(const std::string& text) {
     if (!digits.empty())
         if (const auto unit = std::string_view("KMGT").find(digits.back()); unit != std::string_view::npos)
             shift = 10 * (static_cast<int>(unit) + 1), digits.pop_back();
-    const auto value = number_of<std::int64_t>(digits, "--max-memory", kAllowed);
+    const auto value = number_of<std::int64_t>(digits, flag.c_str(), kAllowed);
     if (value < 1 || value > (std::int64_t{1} << (62 - shift)))
-        throw InputError(fmt::format("--max-memory: found \"{}\"; allowed: {}", text, kAllowed));
+        throw InputError(fmt::format("{}: found \"{}\"; allowed: {}", flag, text, kAllowed));
     return value << shift;
 }
 
@@ -121,7 +121,7 @@ void add_render(CLI::App& app, RenderArguments& a) {
     verb.add_flag_function(
         "--no-skip", [&](std::int64_t) { a.options.skip = false; }, "Visit empty space too");
     verb.add_option_function<std::string>(
-            "--max-memory", [&](const std::string& text) { a.max_memory = size_of(text); },
+            "--max-memory", [&](const std::string& text) { a.max_memory = size_of(text, "--max-memory"); },
             "Refuse a scene that needs more, as in 2G")
         ->type_name("SIZE");
     verb.add_flag("-q,--quiet", a.quiet, "No progress, no summary");
@@ -340,6 +340,26 @@ void add_sweep(CLI::App& app, SweepArguments& a) {
         "  squint sweep head.toml --shard 2/8 -o piece2; squint sweep --collect piece* -o run");
 }
 
+void add_report(CLI::App& app, ReportArguments& a) {
+    CLI::App& verb = *app.add_subcommand("report", "Write what a sweep found as one page, or as numbers");
+    verb.add_option("run", a.run, "The folder that squint sweep filled")->required()->type_name("RUN");
+    verb.add_option("-o,--output", a.output,
+                    "File to write; default: RUN/report.html for the page, standard output for numbers")
+        ->type_name("FILE");
+    verb.add_option("--format", a.format, "html, csv, json or markdown")
+        ->check(CLI::IsMember({"html", "csv", "json", "markdown"}))
+        ->type_name("NAME")
+        ->capture_default_str();
+    verb.add_option_function<std::string>(
+            "--pictures",
+            [&](const std::string& text) { a.most_picture_bytes = size_of(text, "--pictures"); },
+            "Room for pictures in the page; what does not fit is kept coarser; default: 24M")
+        ->type_name("SIZE");
+    verb.footer(
+        "The page needs no network and no server: open it from the disk, or send it.\n\n"
+        "Example:\n  squint report run -o report.html; squint report run --format csv > run.csv");
+}
+
 /// The command as a shell would take it.
 std::string command_text(int argc, char** argv) {
     std::string text = "squint";
@@ -384,6 +404,7 @@ Arguments parse(int argc, char** argv) {
     HardArguments hard;
     TableArguments table;
     SweepArguments sweep;
+    ReportArguments report;
     add_render(app, render);
     add_plan(app, plan);
     add_pixel(app, pixel);
@@ -395,6 +416,7 @@ Arguments parse(int argc, char** argv) {
     add_hard(app, hard);
     add_table(app, table);
     add_sweep(app, sweep);
+    add_report(app, report);
     std::string about;
     CLI::App& help = *app.add_subcommand("help", "Show this help, or a verb's");
     help.add_option("verb", about, "A verb")->type_name("VERB");
@@ -431,6 +453,7 @@ Arguments parse(int argc, char** argv) {
     if (verb == "hard") return hard;
     if (verb == "table") return table;
     if (verb == "sweep") return sweep.command = command_text(argc, argv), sweep;
+    if (verb == "report") return report;
     if (verb == "help" && !about.empty()) {
         const auto of = app.get_subcommands([&](const CLI::App* each) { return each->get_name() == about; });
         if (of.empty()) throw InputError(fmt::format("help: no verb \"{}\"; squint help lists them", about));

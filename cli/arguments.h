@@ -76,13 +76,17 @@ struct SweepArguments {
     int shard = 1, shards = 1, threads = 0;
     bool collect = false, dry_run = false, redo = false, json_lines = false, quiet = false;
 };
+struct ReportArguments {
+    std::string run, output, format = "html";
+    std::int64_t most_picture_bytes = 24 << 20;
+};
 struct Text {  // help, version: printed, done
     std::string text;
 };
 
 using Arguments = std::variant<RenderArguments, PlanArguments, PixelArguments, NumberArguments,
                                CompareArguments, InfoArguments, VolumeArguments, DoctorArguments,
-                               HardArguments, TableArguments, SweepArguments, Text>;
+                               HardArguments, TableArguments, SweepArguments, ReportArguments, Text>;
 
 /// Throws InputError: what was found and where help is.
 Arguments parse(int argc, char** argv);
@@ -99,6 +103,7 @@ int run(const DoctorArguments& arguments);
 int run(const HardArguments& arguments);
 int run(const TableArguments& arguments);
 int run(const SweepArguments& arguments);
+int run(const ReportArguments& arguments);
 int run(const Text& text);
 
 }  // namespace squint::cli

@@ -83,13 +83,15 @@ std::vector<Wire> wires_of_stage(const Plan& plan, std::size_t stage) {
             used.insert(premultiplied(plan) ? Wire::slab_color : Wire::slab_ratio);
             if (premultiplied(plan) && !std::visit([](const auto& m) { return m.kNeedsBack; }, plan.method))
                 used.erase(Wire::slab_ratio);
+            if (!premultiplied(plan) && !straight(plan)) used.insert(Wire::slab_color);  // on its way to C
             return {used.begin(), used.end()};
         }
         case 4:
             return {Wire::light, Wire::dot, Wire::power, Wire::material, Wire::intensity, Wire::lit_color};
         default:
             wires = {Wire::color, Wire::transparency};
-            if (plan.compositing.form == CompositingForm::w) wires.push_back(Wire::contribution);
+            if (plan.compositing.form == CompositingForm::w || plan.compositing.is_unit255())
+                wires.push_back(Wire::contribution);
             return wires;
     }
 }

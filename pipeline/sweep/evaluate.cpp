@@ -263,7 +263,10 @@ std::string Evaluator::identity(const Scene& scene, const std::shared_ptr<const 
                                 const WireSpecs& specs) {
     Hasher hasher;
     hasher.text("squint.point/1");
-    add_settings(hasher, scene, *volume, {});
+    add_settings(hasher, scene, *volume, {"compositing.form"});
+    const CompositingForm form = scene.compositing.form;
+    hasher.text(std::string(
+        name_of(form == CompositingForm::automatic ? preset_form(scene.precision.preset) : form)));
     if (scene.precision.preset == "real")
         hasher.text("real");
     else

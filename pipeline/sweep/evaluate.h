@@ -98,7 +98,8 @@ Json machine_record();
 /// Every n-th pixel, so that no side is longer than `most`, as 16-bit linear words: what reports show.  One
 /// line "squint.values/1 WIDTH HEIGHT STRIDE", then deflated planes R G B A, low bytes before high bytes,
 /// each row as differences from its left neighbour.
-std::string values_file(const Image& image, int most);
+/// `level`: 1 is quick, 9 small.
+std::string values_file(const Image& image, int most, int level = 1);
 Image read_values(const std::string& bytes);  // R G B A
 
 }  // namespace squint::sweep

@@ -65,7 +65,7 @@ std::vector<Axis> wire_axes(const WireAxes& w, const std::vector<Wire>& used) {
     for (const Wire wire : wires) rest(std::string(info(wire).name), {wire});
     for (const Wire wire : wires)
         add(std::string(info(wire).name) + " rounding", {wire}, Part::rounding, {}, w.rounding);
-    if (w.together && wires.size() > 1) {  // one wire alone is all of them already
+    if (w.together && wires.size() > 1) {
         each("all wires", wires), rest("all wires", wires);
         add("all wires rounding", wires, Part::rounding, {}, w.rounding);
     }

@@ -20,7 +20,7 @@ std::uint16_t word_of(float value) {
 
 }  // namespace
 
-std::string values_file(const Image& image, int most) {
+std::string values_file(const Image& image, int most, int level) {
     const int longest = std::max(image.width, image.height);
     const int stride = std::max(1, (longest + most - 1) / most);
     const int width = (image.width + stride - 1) / stride, height = (image.height + stride - 1) / stride;
@@ -46,7 +46,7 @@ std::string values_file(const Image& image, int most) {
     uLongf size = compressBound(planes.size());
     std::string packed(size, '\0');
     const int status = compress2(reinterpret_cast<Bytef*>(packed.data()), &size,
-                                 reinterpret_cast<const Bytef*>(planes.data()), planes.size(), 6);
+                                 reinterpret_cast<const Bytef*>(planes.data()), planes.size(), level);
     if (status != Z_OK) throw std::bad_alloc();
     packed.resize(size);
     return fmt::format("squint.values/1 {} {} {}\n", width, height, stride) + packed;

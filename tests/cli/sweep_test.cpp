@@ -172,10 +172,9 @@ TEST_F(SweepProgram, EndsWithEveryPointWhereverItWasKilled) {
         int status = 0;
         waitpid(child, &status, 0);
         killed += WIFSIGNALED(status);
-        if (fs::exists(folder / "run" / "points")) {
-            for (const auto& [hash, picture] : points("run")) {
-                ASSERT_EQ(picture, whole.at(hash));
-            }
+        if (!fs::exists(folder / "run" / "points")) continue;
+        for (const auto& [hash, picture] : points("run")) {
+            ASSERT_EQ(picture, whole.at(hash));
         }
     }
     EXPECT_GT(killed, 0) << "the program was faster than every pause: nothing was tested";

@@ -146,8 +146,9 @@ TEST(SweepPoint, IsCalledBySpecsAndNotByTheWayTheyAreWritten) {
 }
 
 TEST(SweepPoint, IsCalledByItsDataToo) {
-    const auto points = prepared(parsed(kTiny + "[[axis]]\nkey = 'volume.bits'\nvalues = [8, 10]\n[[axis]]\n"
-                                                "key = 'volume.spacing'\nvalues = [[1, 1, 1], [1, 1, 2]]\n"));
+    const auto points = prepared(
+        parsed(kTiny + "[[axis]]\nkey = 'volume.procedural'\nvalues = ['phantom', 'shells']\n[[axis]]\n"
+                       "key = 'volume.spacing'\nvalues = [[1, 1, 1], [1, 1, 2]]\n"));
     std::set<std::string> hashes;
     for (const Prepared& point : points) hashes.insert(point.hash);
     EXPECT_EQ(hashes.size(), 4u);
@@ -171,9 +172,8 @@ TEST(SweepPoint, MeasuresNoErrorWhereNothingIsRounded) {
 // White fog: C + T is one at every step of the w form, and truncating equation 9 loses some (MATH.md C1).
 TEST(SweepPoint, SeesThatTheWFormConservesAndEquation9DoesNot) {
     const SweepFile sweep = parsed(
-        "[base]\nimage.width = 8\nimage.height = 8\nlights = []\n"
-        "volume.procedural = 'fog'\nvolume.dims = 64\ncamera.height = 60\ntransfer_function.unit_distance = "
-        "1\n"
+        "[base]\nvolume.procedural = 'fog'\nvolume.dims = 64\nimage.width = 8\nimage.height = 8\n"
+        "camera.height = 60\nlights = []\ntransfer_function.unit_distance = 1\n"
         "transfer_function.points = [[0, 1, 1, 1, 0.004], [255, 1, 1, 1, 0.004]]\nsampling.termination = 0\n"
         "[[axis]]\nkey = 'compositing.form'\nvalues = ['w', 'equation_9']\n[measure]\nconservation = true\n");
     Evaluator evaluator(sweep, "");
@@ -222,7 +222,7 @@ TEST(SweepCost, IsTheSumOfWidthsAndOfProductsOfOperandWidths) {
     // Three lerp levels of u12.12; voxels of 8 bits and a sign, then 24 bits and a sign, by a weight of 13.
     EXPECT_EQ(cost.stages[1].word_bits, 3 * 24);
     EXPECT_EQ(cost.stages[1].multiplier_bits, (4 * 9 + 2 * 25 + 25) * 13);
-    // Equation 9 in words of 16 bits: c alpha and C_s T for three colours, T (1 - alpha); wires C and T.
+    // Equation 9, C and T: alpha c, then T times that, then T (1 - alpha), in words of 16 bits.
     EXPECT_EQ(cost.stages[3].word_bits, 2 * 16);
     EXPECT_EQ(cost.stages[3].multiplier_bits, 7 * 16 * 16);
     EXPECT_EQ(cost.pixel_bits, 4 * 16);
@@ -233,9 +233,14 @@ TEST(SweepCost, IsTheSumOfWidthsAndOfProductsOfOperandWidths) {
 }
 
 TEST(SweepCost, CountsEveryWireThatCarriesSomething) {
-    for (const char* lights : {"[]", "'headlight'"}) {
-        const SweepFile sweep =
-            parsed(kTiny + "[measure]\naudit = true\n[[axis]]\nkey = 'lights'\nvalues = [" + lights + "]\n");
+    for (const std::string settings :
+         {"'lights' = []", "'lights' = 'headlight'", "'precision.preset' = 'squeeze'",
+          "'precision.preset' = 'eight_bit'", "'classification.method' = 'pi2d'",
+          "'classification.method' = 'pips'", "'classification.method' = 'pi1d'"}) {
+        const SweepFile sweep = parsed(
+            "[base]\nvolume.dims = 12\nimage.width = 8\nimage.height = 8\ncamera.height = 12\n"
+            "[measure]\naudit = true\n[[axis]]\nsettings = [{ label = 'x', " +
+            settings + " }]\n");
         Evaluator evaluator(sweep, "");
         const Prepared p = evaluator.prepare(expand(sweep, {})[0]);
         const auto used = used_wires(make_plan(p.scene, p.volume));
@@ -243,7 +248,7 @@ TEST(SweepCost, CountsEveryWireThatCarriesSomething) {
         for (const auto& [name, counts] : record["audit"].items()) {
             Wire wire{};
             ASSERT_TRUE(find_wire(name, wire));
-            EXPECT_NE(std::find(used.begin(), used.end(), wire), used.end()) << name << ", lights " << lights;
+            EXPECT_NE(std::find(used.begin(), used.end(), wire), used.end()) << name << ", " << settings;
         }
     }
 }
