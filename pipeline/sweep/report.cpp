@@ -6,6 +6,7 @@
 #include "pipeline/sweep/run.h"
 
 #include <fmt/format.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <cmath>
@@ -142,7 +143,17 @@ std::string base64(const std::string& bytes) {
     return out;
 }
 
-/// Pictures by name, each { width, height, data }; `coarse` ones shrunk until all fit.
+std::string deflated(const std::string& text) {
+    uLongf size = compressBound(text.size());
+    std::string packed(size, '\0');
+    if (compress2(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(text.data()),
+                  text.size(), 6) != Z_OK)
+        throw std::bad_alloc();
+    packed.resize(size);
+    return packed;
+}
+
+/// Pictures by name; those not `in_full` are shrunk until all fit.
 class Pictures {
   public:
     explicit Pictures(std::int64_t room) : room_(room) {}
@@ -150,7 +161,11 @@ class Pictures {
         std::string bytes = bytes_of(path);
         if (!bytes.empty() && names_.insert(name).second) all_.push_back({name, std::move(bytes), in_full});
     }
-    Json packed() {
+    struct Packed {
+        Json index = Json::object();  // name -> width, height, stride, and where in the text it lies
+        std::string text;             // base64, one after the other
+    };
+    Packed packed() {
         std::int64_t full = 0, rest = 0;
         for (const Item& item : all_)
             (item.in_full ? full : rest) += static_cast<std::int64_t>(item.bytes.size()) * 4 / 3;
@@ -158,9 +173,9 @@ class Pictures {
         const double left =
             std::max<double>(static_cast<double>(room_ - full), static_cast<double>(room_) / 4);
         const double keep = rest > 0 ? std::min(1.0, left / static_cast<double>(rest)) : 1;
-        Json json = Json::object();
-        for (const Item& item : all_) json[item.name] = entry(item.bytes, item.in_full ? 1 : keep);
-        return json;
+        Packed packed;
+        for (const Item& item : all_) append(packed, item, item.in_full ? 1 : keep);
+        return packed;
     }
 
   private:
@@ -168,32 +183,27 @@ class Pictures {
         std::string name, bytes;
         bool in_full;
     };
-    static Json entry(const std::string& bytes, double keep) {
-        std::string kept = bytes;
+    static void append(Packed& to, const Item& item, double keep) {
+        std::string kept = item.bytes;
         if (keep < 1) {
-            const Image image = read_values(bytes);
+            const Image image = read_values(item.bytes);
             const double side = std::max(image.width, image.height) * std::sqrt(keep);
             kept = values_file(image, std::max(24, static_cast<int>(side)), 9);
         }
         int width = 0, height = 0, stride = 0;
         std::sscanf(kept.c_str(), "squint.values/1 %d %d %d", &width, &height, &stride);
-        return {{"w", width},
-                {"h", height},
-                {"s", keep < 1 ? stride : 1},
-                {"d", base64(kept.substr(kept.find('\n') + 1))}};
+        const std::string text = base64(kept.substr(kept.find('\n') + 1));
+        to.index[item.name] = {{"w", width},
+                               {"h", height},
+                               {"s", keep < 1 ? stride : 1},
+                               {"at", to.text.size()},
+                               {"size", text.size()}};
+        to.text += text;
     }
     std::int64_t room_;
     std::vector<Item> all_;
     std::set<std::string> names_;
 };
-
-// JSON inside <script>: "</script" and "<!--" must not stand in it.
-std::string for_script(const Json& json) {
-    std::string text = json.dump(-1, ' ', true, Json::error_handler_t::replace);
-    for (std::size_t at = 0; (at = text.find('<', at)) != std::string::npos; at += 6)
-        text.replace(at, 1, "\\u003c");
-    return text;
-}
 
 void replace_once(std::string& text, std::string_view what, const std::string& with) {
     const std::size_t at = text.find(what);
@@ -414,10 +424,24 @@ std::string report_html(const Json& data, const std::string& run, std::int64_t m
                 pictures.add(key.get<std::string>(), run + "/baselines/" + key.get<std::string>() + ".values",
                              true);
     }
+    const Pictures::Packed packed = pictures.packed();
+    // What the audits counted is most of it, and is read when somebody looks at it.
+    Json whole = data, audits = Json::object();
+    whole["pictures"] = packed.index;
+    for (Json& point : whole["points"])
+        if (point.contains("audit")) {
+            audits[point["hash"].get<std::string>()] = std::move(point["audit"]);
+            point["audit"] = true;
+        }
+    const auto text = [](const Json& json) {
+        return base64(deflated(json.dump(-1, ' ', true, Json::error_handler_t::replace)));
+    };
     std::string page(report_page());
-    replace_once(page, "@TITLE@", escaped_html(data["title"].get<std::string>()));
-    replace_once(page, "@DATA@", for_script(data));
-    replace_once(page, "@PICTURES@", for_script(pictures.packed()));
+    replace_once(page, "@PICTURES@", packed.text);
+    replace_once(page, "@AUDITS@", text(audits));
+    replace_once(page, "@DATA@", text(whole));
+    for (const char* place : {"@HEADING@", "@TITLE@"})
+        replace_once(page, place, escaped_html(data["title"].get<std::string>()));
     return page;
 }
 

@@ -1,4 +1,4 @@
-// page.html, report.css, report.js and the libraries -> report.html.
+// The page's parts (page/) and the libraries -> report.html.
 import { createHash } from 'node:crypto';
 import { existsSync, readFileSync, readdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -12,7 +12,6 @@ const libraries = [
   'vega/build/vega.min.js',
   'vega-interpreter/build/vega-interpreter.min.js',
   'vega-lite/build/vega-lite.min.js',
-  'vega-embed/build/vega-embed.min.js',
   'img-comparison-slider/dist/index.js',
 ];
 
@@ -54,14 +53,15 @@ const plain = (script) => script.replace(/\/\/# sourceMappingURL=\S+/g, '').repl
 const hash = (text) => `'sha256-${createHash('sha256').update(text, 'utf8').digest('base64')}'`;
 
 const library = plain(libraries.map(modules).join('\n'));
-const script = plain(read('report.js'));
-const style = modules('img-comparison-slider/dist/styles.css') + read('report.css');
+// Each after what it calls when it is read; one scope, closed to the page.
+const kScripts = ['data', 'charts', 'pareto', 'sensitivity', 'heat', 'ranges', 'pictures', 'table', 'page'];
+const script = plain(`'use strict';\n(() => {\n${kScripts.map((name) => read(`page/${name}.js`)).join('\n')}})();\n`);
+const style = modules('img-comparison-slider/dist/styles.css') + read('page/page.css');
 const parts = {
   '@POLICY@': [
     "default-src 'none'",
     `script-src ${hash(library)} ${hash(script)}`,
-    "style-src 'unsafe-inline'", // styles of elements that the slider and the charts make themselves
-    'img-src data: blob:',
+    `style-src ${hash(style)}`,
     "connect-src 'none'",
     "base-uri 'none'",
     "form-action 'none'",
@@ -71,7 +71,7 @@ const parts = {
   '@SCRIPT@': script,
   '@LICENCES@': escaped(notices()),
 };
-let page = read('page.html');
+let page = read('page/page.html');
 for (const [name, text] of Object.entries(parts)) page = page.replace(name, () => text);
 writeFileSync(join(here, 'report.html'), page);
 console.log(`report.html: ${Math.round(page.length / 1024)} KiB`);
