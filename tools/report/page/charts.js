@@ -7,7 +7,7 @@ const kConfig = {
   aria: false,
   font: 'system-ui, sans-serif', background: '#fff',
   axis: { labelFontSize: 12, titleFontSize: 12.5, titleFontWeight: 500, labelColor: kSoft, titleColor: kInk, gridColor: '#e8ecf3', domainColor: '#b9c1d0', tickColor: '#b9c1d0' },
-  legend: { labelFontSize: 12, titleFontSize: 12.5, titleFontWeight: 500, labelColor: kInk },
+  legend: { labelFontSize: 12, titleFontSize: 12.5, titleFontWeight: 500, labelColor: kInk, symbolOpacity: 1 },
   title: { fontSize: 13.5, fontWeight: 600, anchor: 'start', color: kInk, offset: 8 },
   view: { stroke: '#d9dee8' }, mark: { tooltip: { content: 'data' } }, range: { category: kPalette },
 };
@@ -81,12 +81,15 @@ function errorAxis(domain) {
   const scale = logarithmic() ? { type: 'log', nice: false, padding: 8 } : { zero: false, padding: 8 };
   return { type: 'quantitative', title: kFigures[state.figure], scale: domain ? { ...scale, domain } : scale, axis: { tickCount: 6, format: '~g', labelOverlap: true } };
 }
-// Half an LSB8, named at the right end.
+// Half an LSB8, named at the right end; behind the points.
 function halfLine(domain) {
   if (!inLsb8()) return [];
   const y = { field: 'half', ...errorAxis(domain) };
-  return [
-    { data: { values: [{ half: kHalf }] }, mark: { type: 'rule', strokeDash: [5, 4], color: kSoft, strokeWidth: 1.2 }, encoding: { y } },
-    { data: { values: [{ half: kHalf }] }, mark: { type: 'text', align: 'right', baseline: 'bottom', dx: -4, dy: -2, fontSize: 11, color: kSoft, text: 'half an LSB8' }, encoding: { y, x: { value: 'width' } } },
-  ];
+  return [{ data: { values: [{ half: kHalf }] }, mark: { type: 'rule', strokeDash: [5, 4], color: kSoft, strokeWidth: 1.2 }, encoding: { y } }];
+}
+// Its name, before the points, on a white edge of its own.
+function halfName(domain) {
+  if (!inLsb8()) return [];
+  const text = (look) => ({ data: { values: [{ half: kHalf }] }, mark: { type: 'text', align: 'right', baseline: 'bottom', dx: -4, dy: -3, fontSize: 11.5, text: 'half an LSB8', ...look }, encoding: { y: { field: 'half', ...errorAxis(domain) }, x: { value: 'width' } } });
+  return [text({ stroke: '#fff', strokeWidth: 4, color: '#fff' }), text({ color: kSoft })];
 }

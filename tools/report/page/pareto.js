@@ -35,6 +35,7 @@ function pareto(place, cost, title, without) {
       { params: [{ name: 'brush', select: { type: 'interval', encodings: ['x', 'y'] } }],
         mark: { type: 'point', filled: true, cursor: 'pointer' },
         encoding: { x, y, ...Object.fromEntries(['color', 'size', 'opacity', 'shape'].map((look) => [look, { field: look, type: look === 'size' || look === 'opacity' ? 'quantitative' : 'nominal', scale: null, legend: null }])) } },
+      ...halfName(),
     ],
   }, (view) => {
     view.addEventListener('click', (event, item) => { if (item?.datum?.hash) choose(item.datum.hash); });

@@ -5,12 +5,14 @@ function findAxes() {
   variedAxes = [...new Set(entries.map((e) => e.varied).filter(Boolean))];
   crossAxes = axes.filter((axis) => !variedAxes.includes(axis));
   numericAxes = axes.filter((axis) => data.axes[axis].length > 1 && (data.axes[axis].every((v) => typeof v === 'number') || bitsOfFormats(axis)));
+  numericAxes.sort((a, b) => isBits(b) - isBits(a)); // the question of a sweep is bits, where they are varied
 }
 // An axis whose values are formats with one integer part is an axis of fraction bits.
 function bitsOfFormats(axis) {
   const formats = data.axes[axis].map((v) => /^([us]\d+)\.(\d+)$/.exec(v));
   return formats.every((f) => f && f[1] === formats[0][1]);
 }
+const isBits = (axis) => kBits.test(axis) || bitsOfFormats(axis);
 const numberOn = (axis, value) => typeof value === 'number' ? value : +value.split('.')[1];
 const crossOf = (entry) => JSON.stringify(crossAxes.map((axis) => entry.values[axis] ?? null));
 const wiresVaried = () => data.mode === 'one_at_a_time' && variedAxes.some((a) => kBits.test(a));
@@ -28,7 +30,7 @@ function startSensitivity() {
     const others = Object.keys(data.axes).filter((a) => data.axes[a].length > 1);
     choice('curve-x', 'across', false), choice('curve-by', 'a curve for each', false);
     fill($('curve-x'), numericAxes.map((a) => [a, a]), numericAxes[0]);
-    fill($('curve-by'), [['', 'nothing'], ...others.map((a) => [a, a])], others.find((a) => a !== numericAxes[0] && data.axes[a].length <= 10) ?? '');
+    fill($('curve-by'), [['', 'nothing'], ...others.map((a) => [a, a])], (others.find((a) => !isBits(a) && a !== numericAxes[0] && data.axes[a].length <= 10) ?? others.find((a) => a !== numericAxes[0] && data.axes[a].length <= 10)) ?? '');
   } else {
     $('sensitivity').hidden = true;
   }
@@ -53,15 +55,16 @@ function axisCurves() {
     return { at, series, error: lifted(middle, floor), low: lifted(Math.min(...list), floor), high: lifted(Math.max(...list), floor),
       tip: { ...(by ? { [by]: series } : {}), [x]: at, [kFigures[state.figure]]: number(middle), points: list.length } };
   });
-  const whole = values.every((v) => Number.isInteger(v.at));
-  const across = { field: 'at', type: 'quantitative', title: bitsOfFormats(x) ? `fraction bits of ${x.replace('precision.', '')}` : x, scale: x === 'sampling.step' ? { type: 'log', base: 2, nice: false } : { zero: false, nice: false }, axis: { format: '~g', tickMinStep: whole ? 1 : 0 } };
+  const at = [...new Set(values.map((v) => v.at))], whole = values.every((v) => Number.isInteger(v.at));
+  const across = { field: 'at', type: 'quantitative', title: bitsOfFormats(x) ? `fraction bits of ${x.replace('precision.', '')}` : x, scale: x === 'sampling.step' ? { type: 'log', base: 2, nice: false } : { zero: false, nice: false }, axis: { format: '~g', tickMinStep: whole ? 1 : 0, ...(at.length <= 14 ? { values: at } : {}) } };
   const color = { field: 'series', type: 'nominal', sort: by ? data.axes[by].map(valueText) : null, title: by || null, legend: by ? { orient: 'bottom', columns: 4, symbolType: 'stroke', symbolStrokeWidth: 3, symbolLimit: 40, labelLimit: 260 } : null };
   place.className = 'chart';
   chart(place, `${kFigures[state.figure]} across ${x}`, { height: 310, data: { values }, layer: [
+    ...halfLine(),
     ...(values.some((v) => v.high > v.low) ? [{ mark: { type: 'area', opacity: 0.1 }, encoding: { x: across, y: { field: 'low', ...errorAxis() }, y2: { field: 'high' }, color } }] : []),
     { mark: { type: 'line', strokeWidth: 2 }, encoding: { x: across, y: { field: 'error', ...errorAxis() }, color } },
     { mark: { type: 'point', filled: true, opacity: 1, size: 45 }, encoding: { x: across, y: { field: 'error', ...errorAxis() }, color } },
-    ...halfLine(),
+    ...halfName(),
   ] });
 }
 
@@ -125,6 +128,7 @@ function wirePanel(panel, stage, values, domain, ends, title) {
     { transform: [{ filter: 'datum.first' }], mark: { type: 'point', size: 170, strokeWidth: 1.5, opacity: 1 }, encoding: { x, y, color } },
     { transform: [{ filter: '!datum.base' }], mark: { type: 'point', filled: true, size: 46, opacity: 1, cursor: 'pointer' }, encoding: { x, y, color } },
     { transform: [{ filter: 'datum.base' }], mark: { type: 'point', fill: '#fff', size: 40, strokeWidth: 1.8, opacity: 1, cursor: 'pointer' }, encoding: { x, y, color } },
+    ...halfName(domain),
   ] }, (view) => view.addEventListener('click', (event, item) => { if (item?.datum?.hash) choose(item.datum.hash); }));
 }
 function firstFormats(series, base) {
