@@ -4,6 +4,7 @@
 #include "core/error.h"
 #include "pipeline/record.h"
 #include "pipeline/scene.h"
+#include "pipeline/sweep/sweep_file.h"
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -60,20 +61,30 @@ void add_set(CLI::App& verb, std::vector<std::string>& overrides, const char* he
         ->type_name("KEY=VALUE");
 }
 
-void add_scene(CLI::App& verb, SceneArguments& scene) {
-    verb.add_option("scene", scene.file, "Scene file (TOML); the built-in scene when left out")
-        ->type_name("SCENE.toml");
-    add_set(verb, scene.overrides, "Set any key of the scene; may be repeated, the last wins");
+void add_size(CLI::App& verb, std::vector<std::string>& overrides) {
     verb.add_option_function<std::string>(
             "--size",
             [&](const std::string& text) {
                 const auto [width, height] = pair_of(text, 'x', "--size", "WIDTHxHEIGHT, as in 800x600");
-                scene.overrides.push_back(fmt::format("image.width={}", width));
-                scene.overrides.push_back(fmt::format("image.height={}", height));
+                overrides.push_back(fmt::format("image.width={}", width));
+                overrides.push_back(fmt::format("image.height={}", height));
             },
             "Pixels; the same as setting image.width and image.height")
         ->trigger_on_parse()
         ->type_name("WxH");
+}
+
+/// The value of an enumeration whose names stand in `names`, which CLI11 has checked.
+template <class E, std::size_t n>
+E named(const std::string_view (&names)[n], const std::string& name) {
+    return static_cast<E>(std::find(names, names + n, name) - names);
+}
+
+void add_scene(CLI::App& verb, SceneArguments& scene) {
+    verb.add_option("scene", scene.file, "Scene file (TOML); the built-in scene when left out")
+        ->type_name("SCENE.toml");
+    add_set(verb, scene.overrides, "Set any key of the scene; may be repeated, the last wins");
+    add_size(verb, scene.overrides);
 }
 
 void add_render(CLI::App& app, RenderArguments& a) {
@@ -151,16 +162,7 @@ void add_pixel(CLI::App& app, PixelArguments& a) {
         ->type_name("[SCENE.toml] X Y")
         ->required();
     add_set(verb, a.scene.overrides, "Set any key of the scene; may be repeated, the last wins");
-    verb.add_option_function<std::string>(
-            "--size",
-            [&](const std::string& text) {
-                const auto [width, height] = pair_of(text, 'x', "--size", "WIDTHxHEIGHT, as in 800x600");
-                a.scene.overrides.push_back(fmt::format("image.width={}", width));
-                a.scene.overrides.push_back(fmt::format("image.height={}", height));
-            },
-            "Pixels of the whole picture")
-        ->trigger_on_parse()
-        ->type_name("WxH");
+    add_size(verb, a.scene.overrides);
     verb.add_option_function<std::string>(
             "--samples",
             [&](const std::string& text) {
@@ -360,6 +362,85 @@ void add_report(CLI::App& app, ReportArguments& a) {
         "Example:\n  squint report run -o report.html; squint report run --format csv > run.csv");
 }
 
+void add_search(CLI::App& app, SearchArguments& a) {
+    CLI::App& verb = *app.add_subcommand(
+        "search", "Find the cheapest formats that keep a scene's rounding error under a bound");
+    search::Settings& s = a.settings;
+    verb.add_option("scenes", s.scenes,
+                    "Scene files, one set of formats for all; the built-in scene when left out")
+        ->type_name("SCENE.toml");
+    verb.add_option("--max-error", s.most_error,
+                    "The bound, in 1/255 of full scale, against the same pipeline in double")
+        ->required()
+        ->check(CLI::PositiveNumber)
+        ->type_name("LSB8");
+    verb.add_option_function<std::string>(
+            "--cost",
+            [&](const std::string& name) { s.cost = named<search::CostKind>(search::kCostNames, name); },
+            "What to make small: bits (words and multipliers, docs/sweeps.md), time (of a picture, on this "
+            "machine) or table-bytes; default: bits")
+        ->check(CLI::IsMember({"bits", "time", "table-bytes"}))
+        ->type_name("NAME");
+    verb.add_option_function<std::string>(
+            "--figure",
+            [&](const std::string& name) { s.figure = named<search::Figure>(search::kFigureNames, name); },
+            "What is bounded: max, the greatest error of any pixel, or rms over the foreground; default: max")
+        ->check(CLI::IsMember({"max", "rms"}))
+        ->type_name("NAME");
+    verb.add_option_function<std::string>(
+            "--transfer", [&](const std::string& name) { s.srgb = name == "srgb"; },
+            "linear, or srgb: bound the colours as a display shows them; default: linear")
+        ->check(CLI::IsMember({"linear", "srgb"}))
+        ->type_name("NAME");
+    verb.add_option_function<std::vector<std::string>>(
+            "--wires",
+            [&](const std::vector<std::string>& names) {
+                for (const std::string& name : names) {
+                    Wire wire{};
+                    if (!sweep::find_wire(name, wire))
+                        throw InputError(fmt::format(
+                            "--wires: found \"{}\"; allowed: wires as docs/scene.md, [precision], lists them",
+                            name));
+                    if (std::find(s.wires.begin(), s.wires.end(), wire) == s.wires.end())
+                        s.wires.push_back(wire);
+                }
+            },
+            "Search only these; default: every wire that the scenes use")
+        ->delimiter(',')
+        ->type_name("NAME,...");
+    verb.add_flag_function(
+        "--keep-integer-bits", [&](std::int64_t) { s.integer_bits = false; },
+        "Search fraction bits only: ranges stay as the scene's preset has them");
+    verb.add_option("--views", s.views, "Views of a full turn to tune on; those between them are held out")
+        ->check(CLI::Range(1, 1000))
+        ->type_name("N")
+        ->capture_default_str();
+    verb.add_option("--restarts", s.descent.restarts,
+                    "Times that the search starts again from a random place below")
+        ->check(CLI::Range(0, 10000))
+        ->type_name("N")
+        ->capture_default_str();
+    verb.add_option("--seed", s.descent.seed, "Of the restarts")->type_name("N")->capture_default_str();
+    verb.add_option("-o,--output", s.folder,
+                    "Folder for formats.toml, search.json and the trail: a run that squint report takes; "
+                    "pictures that are there are not rendered again")
+        ->type_name("RUN")
+        ->capture_default_str();
+    add_set(verb, s.overrides, "Set any key of every scene; may be repeated, the last wins");
+    add_size(verb, s.overrides);
+    verb.add_option("--threads", s.threads,
+                    "Pictures at a time; threads of a picture that is timed; default: one a processor")
+        ->check(CLI::Range(1, 4096))
+        ->type_name("N");
+    add_json_flag(verb, a.json);
+    verb.add_flag("-q,--quiet", a.quiet, "No progress, no summary");
+    verb.footer(
+        "The same scenes, settings and seed give the same formats, but where time is the cost.\n\n"
+        "Example:\n"
+        "  squint search head.toml --size 128x128 --max-error 1 -o found\n"
+        "  squint render head.toml --set precision.preset=$PWD/found/formats.toml && squint report found");
+}
+
 /// The command as a shell would take it.
 std::string command_text(int argc, char** argv) {
     std::string text = "squint";
@@ -405,6 +486,8 @@ Arguments parse(int argc, char** argv) {
     TableArguments table;
     SweepArguments sweep;
     ReportArguments report;
+    SearchArguments search;
+    search.settings.folder = "found";
     add_render(app, render);
     add_plan(app, plan);
     add_pixel(app, pixel);
@@ -417,6 +500,7 @@ Arguments parse(int argc, char** argv) {
     add_table(app, table);
     add_sweep(app, sweep);
     add_report(app, report);
+    add_search(app, search);
     std::string about;
     CLI::App& help = *app.add_subcommand("help", "Show this help, or a verb's");
     help.add_option("verb", about, "A verb")->type_name("VERB");
@@ -454,6 +538,7 @@ Arguments parse(int argc, char** argv) {
     if (verb == "table") return table;
     if (verb == "sweep") return sweep.command = command_text(argc, argv), sweep;
     if (verb == "report") return report;
+    if (verb == "search") return search.settings.command = command_text(argc, argv), search;
     if (verb == "help" && !about.empty()) {
         const auto of = app.get_subcommands([&](const CLI::App* each) { return each->get_name() == about; });
         if (of.empty()) throw InputError(fmt::format("help: no verb \"{}\"; squint help lists them", about));

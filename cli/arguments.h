@@ -2,6 +2,7 @@
 #pragma once
 
 #include "pipeline/render.h"
+#include "pipeline/search/search.h"
 
 #include <cstdint>
 #include <optional>
@@ -80,13 +81,18 @@ struct ReportArguments {
     std::string run, output, format = "html";
     std::int64_t most_picture_bytes = 24 << 20;
 };
+struct SearchArguments {
+    search::Settings settings;
+    bool json = false, quiet = false;
+};
 struct Text {  // help, version: printed, done
     std::string text;
 };
 
-using Arguments = std::variant<RenderArguments, PlanArguments, PixelArguments, NumberArguments,
-                               CompareArguments, InfoArguments, VolumeArguments, DoctorArguments,
-                               HardArguments, TableArguments, SweepArguments, ReportArguments, Text>;
+using Arguments =
+    std::variant<RenderArguments, PlanArguments, PixelArguments, NumberArguments, CompareArguments,
+                 InfoArguments, VolumeArguments, DoctorArguments, HardArguments, TableArguments,
+                 SweepArguments, ReportArguments, SearchArguments, Text>;
 
 /// Throws InputError: what was found and where help is.
 Arguments parse(int argc, char** argv);
@@ -104,6 +110,7 @@ int run(const HardArguments& arguments);
 int run(const TableArguments& arguments);
 int run(const SweepArguments& arguments);
 int run(const ReportArguments& arguments);
+int run(const SearchArguments& arguments);
 int run(const Text& text);
 
 }  // namespace squint::cli

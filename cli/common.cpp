@@ -5,6 +5,7 @@
 #include "core/volume_source.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
@@ -98,6 +99,29 @@ std::string table_text(const std::vector<std::vector<std::string>>& rows, std::s
         text += line + "\n";
     }
     return text;
+}
+
+StatusLine::StatusLine(bool wanted) : shown_(wanted && isatty(STDERR_FILENO)) {}
+
+void StatusLine::clear() const {
+    if (shown_) std::fputs("\r\033[K", stderr);
+}
+
+bool StatusLine::due() const {
+    return shown_ && std::chrono::steady_clock::now() - last_ >= std::chrono::milliseconds(100);
+}
+
+void StatusLine::show(const std::string& text, bool last) {
+    if (!shown_ || (!last && !due())) return;
+    last_ = std::chrono::steady_clock::now();
+    std::fputs(("\r\033[K" + text).c_str(), stderr);
+}
+
+std::string text_of_time(double seconds) {
+    if (seconds < 60) return fmt::format("{:.1f} s", seconds);
+    const auto whole = static_cast<long>(seconds + 0.5);
+    if (whole < 3600) return fmt::format("{} min {} s", whole / 60, whole % 60);
+    return fmt::format("{} h {} min", whole / 3600, whole % 3600 / 60);
 }
 
 }  // namespace squint::cli

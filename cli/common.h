@@ -7,6 +7,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include <atomic>
+#include <chrono>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -41,6 +42,24 @@ std::string text_of_count(std::int64_t count);
 /// Rows of cells -> lines with aligned columns, two spaces apart.  The first row is the head; numbers go to
 /// the right.
 std::string table_text(const std::vector<std::vector<std::string>>& rows, std::string_view indent = "");
+
+/// One line on a terminal's standard error, rewritten a few times a second; nothing elsewhere.
+class StatusLine {
+  public:
+    explicit StatusLine(bool wanted);
+    ~StatusLine() { clear(); }
+    void clear() const;
+    /// `last`: shown however soon it comes.
+    void show(const std::string& text, bool last = false);
+    bool due() const;  // whether show() would show something now
+
+  private:
+    bool shown_;
+    std::chrono::steady_clock::time_point last_{};
+};
+
+/// "3.2 s", "12 min 5 s", "3 h 20 min".
+std::string text_of_time(double seconds);
 
 /// True after Ctrl-C while a picture is being rendered (see main.cpp).
 extern std::atomic<bool> interrupted;

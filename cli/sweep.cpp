@@ -4,9 +4,7 @@
 #include "pipeline/sweep/run.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 
@@ -15,37 +13,12 @@ namespace {
 
 using namespace squint::sweep;
 
-std::string text_of_time(double seconds) {
-    if (seconds < 60) return fmt::format("{:.1f} s", seconds);
-    const auto whole = static_cast<long>(seconds + 0.5);
-    if (whole < 3600) return fmt::format("{} min {} s", whole / 60, whole % 60);
-    return fmt::format("{} h {} min", whole / 3600, whole % 3600 / 60);
+std::string text_of(const Progress& p) {
+    const double rate = p.seconds > 0 ? static_cast<double>(p.done) / p.seconds : 0;
+    const double left = rate > 0 ? static_cast<double>(p.total - p.done) / rate : 0;
+    return fmt::format("{} {}/{}, {:.1f} a second, {} left{}", p.doing, p.done, p.total, rate,
+                       text_of_time(left), p.failed ? fmt::format(", {} failed", p.failed) : "");
 }
-
-/// One line on a terminal, rewritten a few times a second.
-class ProgressLine {
-  public:
-    explicit ProgressLine(bool wanted) : shown_(wanted && isatty(STDERR_FILENO)) {}
-    ~ProgressLine() { clear(); }
-    void clear() const {
-        if (shown_) std::fputs("\r\033[K", stderr);
-    }
-    void operator()(const Progress& p) {
-        const auto now = std::chrono::steady_clock::now();
-        if (!shown_ || (p.done < p.total && now - last_ < std::chrono::milliseconds(100))) return;
-        last_ = now;
-        const double rate = p.seconds > 0 ? static_cast<double>(p.done) / p.seconds : 0;
-        const double left = rate > 0 ? static_cast<double>(p.total - p.done) / rate : 0;
-        std::fputs(fmt::format("\r\033[K{} {}/{}, {:.1f} a second, {} left{}", p.doing, p.done, p.total, rate,
-                               text_of_time(left), p.failed ? fmt::format(", {} failed", p.failed) : "")
-                       .c_str(),
-                   stderr);
-    }
-
-  private:
-    bool shown_;
-    std::chrono::steady_clock::time_point last_{};
-};
 
 int join(const SweepArguments& a) {
     const Collected c = collect(a.files, a.output);
@@ -81,8 +54,10 @@ int run(const SweepArguments& a) {
     options.shard = a.shard, options.shards = a.shards, options.threads = a.threads, options.redo = a.redo;
     options.cancelled = &interrupted;
     options.command = a.command;
-    ProgressLine line(!a.quiet);
-    options.progress = [&](const Progress& p) { line(p); };
+    StatusLine line(!a.quiet);
+    options.progress = [&](const Progress& p) {
+        if (line.due() || p.done == p.total) line.show(text_of(p), p.done == p.total);
+    };
     options.note = [&](const std::string& note) {
         if (!a.quiet) std::fputs(fmt::format("note: {}\n", note).c_str(), stderr);
     };

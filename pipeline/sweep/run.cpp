@@ -2,27 +2,21 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
-#include "core/hash.h"
 #include "pipeline/render.h"
+#include "pipeline/sweep/run_folder.h"
+#include "pipeline/sweep/side_by_side.h"
 #include "pipeline/toml.h"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
-#include <ctime>
-#include <exception>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <set>
-#include <sstream>
-#include <thread>
 
 namespace squint::sweep {
 namespace {
@@ -34,128 +28,18 @@ double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-int processors() {
-    return static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-}
-
-// f(0) ... f(count - 1), each on one thread of `threads`; what f throws first stops the rest and is thrown
-// here.
-template <class F>
-void side_by_side(std::size_t count, int threads, F&& f) {
-    std::atomic<std::size_t> next{0};
-    std::atomic<bool> stop{false};
-    std::exception_ptr first;
-    std::mutex mutex;
-    const auto work = [&] {
-        tbb::task_arena alone(1);  // what a point does in parallel inside stays on its own thread
-        alone.execute([&] {
-            for (std::size_t i; !stop && (i = next++) < count;) try {
-                    f(i);
-                } catch (...) {
-                    const std::lock_guard lock(mutex);
-                    if (!first) first = std::current_exception();
-                    stop = true;
-                }
-        });
-    };
-    std::vector<std::thread> pool;
-    for (int t = 1; t < std::min<int>(threads, static_cast<int>(std::max<std::size_t>(count, 1))); ++t)
-        pool.emplace_back(work);
-    work();
-    for (std::thread& thread : pool) thread.join();
-    if (first) std::rethrow_exception(first);
-}
-
-void make_folder(const std::string& path) {
-    std::error_code error;
-    fs::create_directories(path, error);
-    if (error) throw InputError(fmt::format("{}: cannot make the folder: {}", path, error.message()));
-}
-
-std::string dump(const Json& json) {
-    return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
-}
-
-std::string point_path(const std::string& folder, const std::string& hash) {
-    return folder + "/points/" + hash + ".json";
-}
-
-/// One of the sweep's points: where it stands in the list and what names it.
-struct Entry {
-    Point point;
-    std::string hash;
-};
-
-std::vector<Entry> list_points(const SweepFile& sweep, Evaluator& evaluator, int threads,
-                               const std::atomic<bool>* cancelled) {
+std::vector<ListedPoint> list_points(const SweepFile& sweep, Evaluator& evaluator, int threads,
+                                     const std::atomic<bool>* cancelled) {
     std::vector<Wire> used;
     if (sweep.wires.present && sweep.wires.wires.empty()) used = evaluator.wires_in_use();
     std::vector<Point> points = expand(sweep, used);
-    std::vector<Entry> entries(points.size());
+    std::vector<ListedPoint> entries(points.size());
     side_by_side(points.size(), threads, [&](std::size_t i) {
         if (cancelled && *cancelled) throw Cancelled{};
         entries[i].hash = evaluator.prepare(points[i]).hash;
         entries[i].point = std::move(points[i]);
     });
     return entries;
-}
-
-Json sweep_record(const SweepFile& sweep, const std::vector<Entry>& entries,
-                  const std::vector<std::string>& wanted) {
-    Json axes = Json::object();
-    for (const Entry& entry : entries)
-        for (const auto& [axis, label] : entry.point.values) {
-            Json& values = axes[axis];
-            const Json value = value_of_label(label);
-            if (!values.is_array()) values = Json::array();
-            if (values.size() < 10'000 && std::find(values.begin(), values.end(), value) == values.end())
-                values.push_back(value);
-        }
-    Json points = Json::array();
-    for (const Entry& entry : entries) {
-        Json values = Json::object();
-        for (const auto& [axis, label] : entry.point.values) values[axis] = value_of_label(label);
-        Json point{{"hash", entry.hash}, {"values", values}};
-        if (!entry.point.varied.empty()) point["varied"] = entry.point.varied;
-        points.push_back(std::move(point));
-    }
-    constexpr const char* kModes[] = {"product", "one_at_a_time", "random"};
-    Json scenes = Json::array();
-    for (std::size_t i = 0; i < sweep.scenes.size(); ++i) scenes.push_back(scene_path(sweep, i));
-    return {{"schema", "squint.sweep/1"},
-            {"title", sweep.title},
-            {"note", sweep.note},
-            {"file", fs::path(sweep.name).filename().string()},
-            {"text", sweep.text},
-            {"scenes", scenes},
-            {"overrides", sweep.overrides},
-            {"mode", kModes[static_cast<int>(sweep.mode)]},
-            {"seed", sweep.seed},
-            {"measured", wanted},
-            {"axes", axes},
-            {"points", points}};
-}
-
-/// A record that is there, whole, and holds all that is wanted.
-enum class State { missing, reusable, other_program };
-State state_of(const std::string& path, const std::vector<std::string>& wanted) {
-    std::error_code ignored;
-    if (!fs::exists(path, ignored)) return State::missing;
-    Json record;
-    try {
-        record = read_json(path);
-        if (record.at("status") != "done") return State::missing;  // the reason may be mended by now
-        const auto measured = record.at("measured").get<std::vector<std::string>>();
-        for (const std::string& name : wanted)
-            if (std::find(measured.begin(), measured.end(), name) == measured.end()) return State::missing;
-        return record.at("program") == program_record()["program"] ? State::reusable : State::other_program;
-    } catch (const std::exception&) {
-        return State::missing;
-    }
-}
-
-std::string now_text() {
-    return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
 }
 
 class Runner {
@@ -170,32 +54,18 @@ class Runner {
 
     RunSummary run() {
         const auto begun = Clock::now();
-        const std::string started = now_text();
-        for (const char* room : {"points", "pictures", "baselines", "runs"})
-            make_folder(options_.folder + "/" + room);
+        make_run_folder(options_.folder);
         find_missing();
         if (summary_.other_program > 0)
             note(fmt::format("{} points were computed by another build of squint; --redo computes them anew",
                              summary_.other_program));
-        const auto write_run = [&](const char* state) {
-            Json run{{"schema", "squint.run/1"},
-                     {"command", options_.command},
-                     {"started", started},
-                     {"seconds", seconds_since(begun)},
-                     {"state", state},
-                     {"machine", machine_record()},
-                     {"threads", threads_},
-                     {"shard", fmt::format("{}/{}", options_.shard, options_.shards)},
-                     {"computed", summary_.computed},
-                     {"reused", summary_.reused},
-                     {"failed", summary_.failed}};
-            run.update(program_record());
-            const auto ticks = std::chrono::system_clock::now().time_since_epoch().count();
-            if (run_name_.empty())
-                run_name_ = fmt::format("{}/runs/{:016x}-{}.json", options_.folder, ticks, getpid());
-            write_text_whole(run_name_, dump(run));
-        };
         if (!missing_.empty()) {
+            RunLog log(options_.folder, {{"command", options_.command},
+                                         {"threads", threads_},
+                                         {"shard", fmt::format("{}/{}", options_.shard, options_.shards)}});
+            const auto write_run = [&](const char* state) {
+                log.write(state, seconds_since(begun), {summary_.computed, summary_.reused, summary_.failed});
+            };
             write_run("begun");
             try {
                 make_baselines();
@@ -214,7 +84,7 @@ class Runner {
         find_missing();
         Forecast f;
         f.points = summary_.points, f.distinct = summary_.distinct, f.missing = missing_.size();
-        for (const Entry& entry : entries_) {
+        for (const ListedPoint& entry : entries_) {
             std::string line = entry.hash;
             for (const auto& [axis, label] : entry.point.values)
                 line += fmt::format("  {} = {}", axis, label);
@@ -276,17 +146,18 @@ class Runner {
         for (const std::size_t i : mine) {
             if (number++ % shards != static_cast<std::size_t>(options_.shard - 1)) continue;
             of_shard.insert(entries_[i].hash);
-            const State state = options_.redo || options_.folder.empty()
-                                    ? State::missing
-                                    : state_of(point_path(options_.folder, entries_[i].hash), wanted);
-            if (state == State::missing)
+            const RecordState state = options_.redo || options_.folder.empty()
+                                          ? RecordState::missing
+                                          : state_of(point_path(options_.folder, entries_[i].hash), wanted);
+            if (state == RecordState::missing)
                 missing_.push_back(i);
             else
-                ++summary_.reused, summary_.other_program += state == State::other_program;
+                ++summary_.reused, summary_.other_program += state == RecordState::other_program;
         }
         summary_.distinct = of_shard.size();
-        summary_.points = static_cast<std::size_t>(std::count_if(
-            entries_.begin(), entries_.end(), [&](const Entry& e) { return of_shard.contains(e.hash); }));
+        summary_.points = static_cast<std::size_t>(
+            std::count_if(entries_.begin(), entries_.end(),
+                          [&](const ListedPoint& e) { return of_shard.contains(e.hash); }));
     }
 
     void make_baselines() {
@@ -313,12 +184,11 @@ class Runner {
     void compute() {
         const bool timed = sweep_.measure.repeats > 0;
         const auto start = Clock::now();
-        const std::vector<std::string> wanted = evaluator_.wanted();
         side_by_side(missing_.size(), timed ? 1 : threads_, [&](std::size_t n) {
             check_cancelled();
-            const Entry& entry = entries_[missing_[n]];
-            const Json record = record_of(entry, wanted, timed);
-            write_text_whole(point_path(options_.folder, entry.hash), dump(record));
+            const ListedPoint& entry = entries_[missing_[n]];
+            const Json record = write_record(evaluator_, evaluator_.prepare(entry.point), options_.folder,
+                                             timed ? threads_ : 1, timed);
             const std::lock_guard lock(mutex_);
             ++summary_.computed;
             if (record["status"] == "failed") ++summary_.failed;
@@ -327,39 +197,14 @@ class Runner {
         });
     }
 
-    Json record_of(const Entry& entry, const std::vector<std::string>& wanted, bool timed) {
-        const Prepared point = evaluator_.prepare(entry.point);
-        Json record{{"schema", "squint.point/1"}, {"hash", entry.hash}};
-        record.update(program_record());
-        record["scene"] = point.scene_file;
-        record["settings"] = point.settings;
-        record["measured"] = wanted;
-        std::string reason;
-        try {
-            const Json figures = evaluator_.measure(point, timed ? threads_ : 1, timed);
-            record["status"] = "done";
-            record.update(figures);
-            return record;
-        } catch (const InputError& error) {
-            reason = error.what();
-        } catch (const std::bad_alloc&) {
-            reason = "out of memory";
-        } catch (const std::exception& error) {
-            reason = fmt::format("internal error: {}", error.what());
-        }
-        record["status"] = "failed", record["reason"] = reason;
-        return record;
-    }
-
     const SweepFile& sweep_;
     const RunOptions& options_;
     bool dry_;
     int threads_;
     Evaluator evaluator_;
-    std::vector<Entry> entries_;
+    std::vector<ListedPoint> entries_;
     std::vector<std::size_t> missing_;  // indices into entries_
     RunSummary summary_;
-    std::string run_name_;
     std::mutex mutex_;
 };
 
@@ -381,7 +226,6 @@ Json read_json(const std::string& path) {
 }
 
 RunSummary run_sweep(const SweepFile& sweep, const RunOptions& options) {
-    make_folder(options.folder);
     return Runner(sweep, options, false).run();
 }
 
@@ -390,7 +234,7 @@ Forecast forecast(const SweepFile& sweep, const RunOptions& options) {
 }
 
 Collected collect(const std::vector<std::string>& pieces, const std::string& folder) {
-    for (const char* room : {"points", "pictures", "baselines", "runs"}) make_folder(folder + "/" + room);
+    make_run_folder(folder);
     std::error_code ignored;
     const std::string joint = folder + "/sweep.json";
     Collected result;

@@ -1,0 +1,77 @@
+// squint search: the cheapest formats under an error, as a preset file, with the way there as a run.
+#include "pipeline/search/search.h"
+#include "cli/common.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+
+namespace squint::cli {
+namespace {
+
+using search::Candidate;
+
+std::string text_of_error(double error) {
+    return std::isfinite(error) ? fmt::format("{:.4g}", error) : "none";
+}
+
+std::string summary(const search::Settings& s, const search::Result& r) {
+    const char* figure = s.figure == search::Figure::largest ? "greatest" : "rms";
+    std::string text = fmt::format(
+        "{} error of at most {:g} LSB8{} at {} degrees; held out: {} degrees; {} formats tried, {} "
+        "pictures\n",
+        figure, s.most_error, s.srgb ? " on an sRGB display" : "", fmt::join(r.degrees, ", "),
+        fmt::join(r.other_degrees, ", "), r.trials, r.pictures);
+    std::vector<std::vector<std::string>> rows{{"", "bits", "table bytes", "error", "held out"}};
+    const bool timed = s.cost == search::CostKind::time;
+    if (timed) rows[0].insert(rows[0].begin() + 1, "ms");
+    for (const Candidate* c : {&r.found, &r.scene, &r.squeeze}) {
+        rows.push_back({c->name, fmt::format("{:.0f}", c->bits), fmt::format("{:.0f}", c->table_bytes),
+                        text_of_error(c->error), text_of_error(c->other_error)});
+        if (timed) rows.back().insert(rows.back().begin() + 1, fmt::format("{:.3g}", c->ms));
+    }
+    text += table_text(rows) + "\n";
+    rows = {{"wire", "found", "as the scene says", "Squeeze's table", "alone"}};
+    for (std::size_t w = 0; w < r.wires.size(); ++w)
+        rows.push_back({std::string(info(r.wires[w]).name), to_string(r.found.specs[w].format),
+                        to_string(r.scene.specs[w].format), to_string(r.squeeze.specs[w].format),
+                        to_string(r.alone[w].format)});
+    text += table_text(rows) + "\n";
+    for (const Candidate* c : {&r.found, &r.scene, &r.squeeze})
+        if (!c->failure.empty()) text += fmt::format("{}: {}\n", c->name, c->failure);
+    const double margin = s.most_error - r.found.other_error;
+    text += fmt::format(
+        "found: {:.1f} % {} Squeeze's table in bits; on views it was not tuned on {:.4g} LSB8 {} the bound\n",
+        std::abs(100 * (1 - r.found.bits / r.squeeze.bits)),
+        r.found.bits <= r.squeeze.bits ? "below" : "above", std::abs(margin),
+        margin >= 0 ? "inside" : "outside");
+    return text + fmt::format("{}: squint render {}--set precision.preset={}\n", r.formats_file,
+                              s.scenes.empty() ? "" : s.scenes[0] + " ",
+                              std::filesystem::absolute(r.formats_file).string());
+}
+
+}  // namespace
+
+int run(const SearchArguments& a) {
+    search::Settings settings = a.settings;
+    settings.cancelled = &interrupted;
+    StatusLine line(!a.quiet);
+    settings.progress = [&](const std::string& text) { line.show(text); };
+    settings.note = [&](const std::string& note) {
+        if (!a.quiet) line.clear(), std::fputs(fmt::format("note: {}\n", note).c_str(), stderr);
+    };
+    const Interruptible here;
+    const search::Result result = run_search(settings);
+    line.clear();
+    if (a.json)
+        print_json(result.json);
+    else if (!a.quiet)
+        print(summary(settings, result));
+    return kDone;
+}
+
+}  // namespace squint::cli
