@@ -60,7 +60,8 @@ PresetInputs preset_inputs(const Plan& plan) {
         total += e.opaque ? std::max(e.extinction, 1 / plan.step_world) : e.extinction;
     }
     in.depth_bits = std::max(1, bits_for(deepest * plan.step_world));
-    in.total_depth_bits = std::max(1, bits_for(total * plan.step_world));
+    in.total_depth_bits = std::max(1, bits_for(std::max(total, deepest) * plan.step_world));
+    in.step = plan.scene.sampling.step;
     return in;
 }
 

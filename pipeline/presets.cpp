@@ -57,34 +57,35 @@ WireSpecs eight_bit(const PresetInputs& in) {
 }
 
 // Squeeze's widths where its corrected analysis holds, rounded to even, and the direction as a wire of its
-// own.  Lerp levels and gradients are cut so that every exact product fits a 32-bit word: 12 bits of weight
-// leave the middle levels 19 - I bits.
+// own.  Lerp levels are cut so that every exact product fits a 32-bit word: 12 bits of weight leave the
+// middle levels 19 - I bits.
 WireSpecs standard(const PresetInputs& in) {
     constexpr Rounding r = Rounding::rnd_conv;
-    // Halves are rare in interpolation, and rounding them up costs two instructions where rounding to even
-    // costs five.
+    // Halves up where lerp(a, b, w) = lerp(b, a, 1 - w) must hold: to even, it does not
+    // (docs/decisions/0002).
     constexpr Rounding up = Rounding::rnd;
     const int scalar = in.scalar_bits, weight = scalar <= 12 ? 12 : 10;
     const int level = 31 - scalar - weight;  // fraction bits of a middle level: I + level + weight <= 31
     const int gradient = 12;  // the lit samples are few: 64-bit lanes carry what weak gradients need
+    const int sum = accumulating_bits(in);
     WireSpecs w{};
-    w[Wire::location] = u(in.location_bits, clip(31 - in.location_bits), up);
+    w[Wire::location] = u(in.location_bits, clip(31 - in.location_bits), r);
     w[Wire::direction] = s(in.direction_bits, w[Wire::location].format.fraction_bits, r);
     w[Wire::weight] = u(1, weight, up), w[Wire::length] = u(1, 9, r);
     w[Wire::lerp_x] = w[Wire::lerp_y] = u(scalar, level, up),
     w[Wire::sample] = u(scalar, std::min(12, 24 - scalar), up);
-    w[Wire::gradient_lerp] = w[Wire::gradient] = s(scalar, gradient, up), w[Wire::spacing] = u(1, 12, r);
+    w[Wire::gradient_lerp] = w[Wire::gradient] = s(scalar, gradient, r), w[Wire::spacing] = u(1, 12, r);
     w[Wire::normal] = s(1, 15, r);
-    w[Wire::classification_input] = u(in.entry_bits, 8, up);
-    w[Wire::table_color] = w[Wire::table_alpha] = u(1, 15, r);
+    w[Wire::classification_input] = u(in.entry_bits, 8, r);
+    w[Wire::table_color] = u(1, 15, r), w[Wire::table_alpha] = u(1, sum, r);
     w[Wire::table_extinction] = w[Wire::table_moment] =
-        u(in.total_depth_bits, std::min(20, clip(31 - in.total_depth_bits)), r);
-    w[Wire::slab_depth] = u(4, 18, r);
-    w[Wire::slab_ratio] = w[Wire::slab_alpha] = w[Wire::slab_color] = u(1, 15, r);
+        u(in.total_depth_bits, std::min(std::max(20, sum + 1), clip(31 - in.total_depth_bits)), r);
+    w[Wire::slab_depth] = u(4, clip(sum + 3), r);
+    w[Wire::slab_ratio] = u(1, 15, r), w[Wire::slab_alpha] = w[Wire::slab_color] = u(1, sum, r);
     w[Wire::light] = s(1, 14, r), w[Wire::dot] = s(1, 15, r), w[Wire::power] = u(1, 15, r),
     w[Wire::material] = u(1, 14, r);
-    w[Wire::intensity] = u(1, 14, r), w[Wire::lit_color] = u(1, 15, r);
-    w[Wire::contribution] = w[Wire::color] = w[Wire::transparency] = u(1, 15, r);
+    w[Wire::intensity] = u(1, 14, r), w[Wire::lit_color] = u(1, sum, r);
+    w[Wire::contribution] = w[Wire::color] = w[Wire::transparency] = u(1, sum, r);
     return w;
 }
 
@@ -118,6 +119,12 @@ WireSpecs wide(const PresetInputs& in) {
 const std::vector<std::string>& preset_names() {
     static const std::vector<std::string> names{"default", "squeeze", "eight_bit", "wide", "real"};
     return names;
+}
+
+int accumulating_bits(const PresetInputs& in) {
+    constexpr int kOfThirtyTwoBits = 15;  // two factors of u1.15 and a sign
+    if (in.step >= 0.5 && in.ray_bits <= 12) return kOfThirtyTwoBits;
+    return std::clamp(9 + in.ray_bits, kOfThirtyTwoBits, kMostFractionBits);
 }
 
 bool preset_specs(std::string_view name, const PresetInputs& inputs, WireSpecs& specs) {

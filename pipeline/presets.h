@@ -19,10 +19,16 @@ struct PresetInputs {
     int direction_bits = 1;     // I of |V|
     int ray_bits = 10;          // log2 of the samples on the longest ray, rounded up
     int depth_bits = 4;         // I of the optical depth of one slab
-    int total_depth_bits = 12;  // I of the prefix sum of all entries' optical depths
+    int total_depth_bits = 12;  // I of the prefix sum of all entries' optical depths, and of any one of them
+    double step = 1;            // slab length in voxels
 };
 
 const std::vector<std::string>& preset_names();
+
+/// Fraction bits that `default` gives what adds up along a ray (opacities, T, C, prefix sums).  15, which
+/// 32-bit words multiply, at steps of half a voxel or more and up to 4096 samples; beyond, 9 + log2(samples),
+/// which keeps half a last bit at every sample below half an LSB8 of the picture (MATH, B5 and C6).
+int accumulating_bits(const PresetInputs& inputs);
 
 /// Fills `specs`; false if the name is unknown.  `real` has the formats of `wide`, which say where its raw
 /// units stand.

@@ -160,7 +160,7 @@ MomentSeries build_moment_series(const ClassificationInputs& in) {
     // Sub-entries where one entry alone is deep.
     const double deepest = preintegration::deepest_entry(in.entries, in.step_world);
     const int wanted = deepest <= 1 ? 0 : deepest <= 8 ? 2 : 3;
-    m.sub_entry_bits = std::min(wanted, in.input_fraction);
+    m.sub_entry_bits = std::min(std::max(wanted, sub_entry_bits_for_color(in, kMostRows)), in.input_fraction);
     while (m.sub_entry_bits > 0 && in.entries.size() << m.sub_entry_bits > kMostRows) --m.sub_entry_bits;
     const Entries fine =
         m.sub_entry_bits ? preintegration::subdivided(in.entries, 1 << m.sub_entry_bits) : in.entries;
@@ -199,7 +199,6 @@ MomentSeries build_moment_series(const ClassificationInputs& in) {
     // Cutting deep slabs.
     const Spec extinction = in.specs[Wire::table_extinction];
     m.to_cut = Rescale(extinction.format.fraction_bits, {extinction.format, Rounding::trn, Overflow::sat});
-    m.to_place = Rescale(0, {{1, in.input_fraction, false}, Rounding::rnd, Overflow::sat});
     m.to_piece = Rescale(2 * alpha.format.fraction_bits, alpha, static_cast<int>(Wire::slab_alpha));
     m.to_whole = Rescale(ratio.format.fraction_bits, ratio, ratio_wire);
 

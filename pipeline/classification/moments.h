@@ -48,16 +48,16 @@ struct MomentSeries {
     Rescale to_share;                                      // a word over another
     Rescale to_weight;                                     // between rows
     Rescale to_ratio;
-    Rescale to_cut, to_place;  // where a deep slab is cut: in T, and in an entry
-    Rescale to_piece;          // a piece's share of the light
-    Rescale to_whole;          // pieces' light over their opacity
+    Rescale to_cut;    // where a deep slab is cut, in T
+    Rescale to_piece;  // a piece's share of the light
+    Rescale to_whole;  // pieces' light over their opacity
     std::string note;
 
     template <class V>
     void visit(V&& v) {
         prefix.visit(v), v(levels), v(moments), v(weights);
         for (Rescale* r : {&to_part, &to_product, &to_mean, &to_share, &to_weight, &to_ratio, &to_cut,
-                           &to_place, &to_piece, &to_whole})
+                           &to_piece, &to_whole})
             v(*r);
     }
     void describe(ClassificationReport& report) const;
@@ -82,15 +82,6 @@ namespace squint::HWY_NAMESPACE {
 
 template <class W>
 using Powers = std::array<W, kMostMomentOrder>;
-
-/// Where an input stands between two sub-entries.
-template <class W>
-HWY_INLINE EntryPosition<W> sub_entry_position(const MomentSeries& m, W input) {
-    const EntryPosition<W> at = entry_position(m.prefix.entries, input);
-    const int bits = m.sub_entry_bits, fraction = m.prefix.entries.input_fraction - bits;
-    const W sub = min(floor_shift(at.fraction, fraction), constant<W>((std::int64_t{1} << bits) - 1));
-    return {shift_left(at.entry, bits) + sub, at.fraction - shift_left(sub, fraction)};
-}
 
 /// One end of a slab in its block: depths from the block's start to its sub-entry's start, to itself, and to
 /// the sub-entry's end.
@@ -218,8 +209,9 @@ template <class W>
 HWY_NOINLINE std::array<W, 3> series_color(const MomentSeries& m, W near, W far, W depth) {
     const W zero = constant<W>(0);
     // The level whose block holds both ends.
-    const EntryPosition<W> low = sub_entry_position(m, min(near, far)),
-                           high = sub_entry_position(m, max(near, far));
+    const EntryLookup& e = m.prefix.entries;
+    const EntryPosition<W> low = sub_entry_position(e, m.sub_entry_bits, min(near, far)),
+                           high = sub_entry_position(e, m.sub_entry_bits, max(near, far));
     const std::int64_t last = static_cast<std::int64_t>(m.prefix.entries.last_segment + 1)
                               << m.sub_entry_bits;
     const W level = within(bit_length(within(high.entry - low.entry, 0, last)), 0, m.levels.rows() - 1);
@@ -259,23 +251,28 @@ HWY_NOINLINE std::array<W, 3> series_color(const MomentSeries& m, W near, W far,
     return color;
 }
 
-/// The input at which T reaches `target`: the entry by bisection, straight inside it.
+/// The last input at which T, in its words' units, is not above `target`: by bisection, first over entries,
+/// then inside one.
 template <class W>
 HWY_NOINLINE W input_at_depth(const MomentSeries& m, W target) {
-    const EntryLookup& e = m.prefix.entries;
+    const PrefixLookup& p = m.prefix;
+    const EntryLookup& e = p.entries;
     const W last = constant<W>(e.last_segment);
-    W entry = constant<W>(0);
+    W entry = constant<W>(0), fraction = constant<W>(0);
     for (int bit = e.last_segment; bit > 0; bit /= 2) {
         // Steps of 2^k, from the largest that fits.
         const int step = 1 << (31 - __builtin_clz(static_cast<unsigned>(bit)));
         const W next = min(entry + constant<W>(step), last);
-        entry = select(target < gather(m.prefix.depth, next, 0), entry, next);
+        entry = select(target < gather(p.depth, next, 0), entry, next);
     }
     entry = within(entry, 0, e.last_segment);
-    const W start = gather(m.prefix.depth, entry, 0);
-    const W inside = max(gather(m.prefix.depth, entry + constant<W>(1), 0) - start, constant<W>(1));
-    const W place = divide(clamp(target - start, constant<W>(0), inside), inside, m.to_place);
-    return shift_left(entry, e.input_fraction) + min(place, constant<W>(std::int64_t{1} << e.input_fraction));
+    for (int bit = e.input_fraction - 1; bit >= 0; --bit) {
+        const W next =
+            within(fraction + constant<W>(std::int64_t{1} << bit), 0, std::int64_t{1} << e.input_fraction);
+        const W there = floor_shift(depth_at(p, EntryPosition<W>{entry, next}), p.gained_bits());
+        fraction = select(target < there, fraction, next);
+    }
+    return shift_left(entry, e.input_fraction) + fraction;
 }
 
 /// The straight colour of a slab in kPieces pieces of equal depth, none but the last deeper than the limit.
@@ -284,18 +281,20 @@ HWY_NOINLINE std::array<W, 3> color_in_pieces(const MomentSeries& m, const CutSl
                                               const SlabDepth<W>& whole) {
     const PrefixLookup& p = m.prefix;
     const W zero = constant<W>(0), one = constant<W>(p.entries.one_alpha);
-    const W share = min(floor_shift(whole.difference, 2), divide(whole.difference * constant<W>(m.limit),
-                                                                 max(whole.depth, constant<W>(1)), m.to_cut));
+    const W difference = floor_shift(whole.difference, p.gained_bits());
+    const W share = min(floor_shift(difference, 2), divide(difference * constant<W>(m.limit),
+                                                           max(whole.depth, constant<W>(1)), m.to_cut));
     const auto ascending = front < cut.end_input;
     const W signed_share = select(ascending, share, zero - share);
     const W low = min(front, cut.end_input), high = max(front, cut.end_input);
-    W target = prefix_at(p.depth, cut.front, 0, p.to_part), near = front, near_depth = target, through = one;
+    W near = front, near_depth = depth_at(p, cut.front), through = one;
+    W target = floor_shift(near_depth, p.gained_bits());
     std::array<W, 3> light{zero, zero, zero};
     for (int piece = 1; piece <= kPieces; ++piece) {
         target = target + signed_share;
         const W far =
             piece == kPieces ? cut.end_input : clamp(input_at_depth(m, max(target, zero)), low, high);
-        const W far_depth = prefix_at(p.depth, entry_position(p.entries, far), 0, p.to_part);
+        const W far_depth = depth_at(p, entry_position(p.entries, far));
         const W depth = depth_of(p, absolute(far_depth - near_depth), cut.span, length);
         const std::array<W, 3> color = series_color(m, near, far, depth);
         const W part =

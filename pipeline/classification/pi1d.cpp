@@ -23,8 +23,8 @@ PreIntegrated1D build_pre_integrated_1d(const ClassificationInputs& in) {
             m.sums.set(i, c, tables.colored_sum[static_cast<std::size_t>(c)][at], sum);
         m.sums.set(i, PreIntegrated1D::value, tables.sum[at], sum);
     }
-    const int fraction = sum.format.fraction_bits, mean = fraction - in.input_fraction;
-    m.to_part = Rescale(fraction + in.input_fraction, sum, static_cast<int>(Wire::table_moment));
+    const int mean =
+        sum.format.fraction_bits;  // of a sum with input_fraction bits more over a span with them
     const auto to = [&](Wire wire) { return Rescale(mean, in.specs[wire], static_cast<int>(wire)); };
     m.to_color = to(Wire::slab_color), m.to_alpha = to(Wire::slab_alpha), m.to_depth = to(Wire::slab_depth);
     return m;

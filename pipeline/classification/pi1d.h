@@ -23,14 +23,13 @@ struct PreIntegrated1D {
     PremultipliedRules premultiplied;
     Table sums;  // prefix sums of value times colour, and of value
     bool is_opacity = true;
-    Rescale to_part;   // the part of a sum inside an entry
     Rescale to_color;  // means
     Rescale to_alpha;
     Rescale to_depth;
 
     template <class V>
     void visit(V&& v) {
-        prefix.visit(v), premultiplied.visit(v), v(sums), v(to_part), v(to_color), v(to_alpha), v(to_depth);
+        prefix.visit(v), premultiplied.visit(v), v(sums), v(to_color), v(to_alpha), v(to_depth);
     }
     void describe(ClassificationReport& report) const {
         prefix.describe(report);
@@ -61,8 +60,9 @@ HWY_INLINE Slab<W> classify(const PreIntegrated1D& m, W front, W back, W length)
     const CutSlab<W> cut = cut_at_wall(m.prefix, front, back);
     const W span = max(cut.span, constant<W>(1));
     const auto sum_of = [&](int column) {
-        return absolute(prefix_at(m.sums, cut.end, column, m.to_part) -
-                        prefix_at(m.sums, cut.front, column, m.to_part));
+        const int bits = m.prefix.entries.input_fraction;
+        return absolute(prefix_at(m.sums, cut.end, column, bits) -
+                        prefix_at(m.sums, cut.front, column, bits));
     };
     Slab<W> slab;
     const W value = sum_of(PreIntegrated1D::value), one = constant<W>(m.prefix.entries.one_alpha);

@@ -2,23 +2,26 @@
 
 #include "pipeline/preintegration/prefix_tables.h"
 
+#include <cmath>
+
 namespace squint {
 
 PowerSeriesOfOrder1 build_power_series_of_order_1(const ClassificationInputs& in) {
     PowerSeriesOfOrder1 m;
-    m.prefix = build_prefix_lookup(in);
+    constexpr int kMostRows = 8192;
+    const int bits = sub_entry_bits_for_color(in, kMostRows);
+    m.prefix = build_prefix_lookup(in, bits);
     const Spec moment = in.specs[Wire::table_moment], ratio = in.specs[Wire::slab_ratio];
-    const preintegration::PrefixTables tables = preintegration::build_prefix_tables(in.entries, 1);
-    m.moment = Table(in.entries.size(), 3);
+    const preintegration::PrefixTables tables = preintegration::build_prefix_tables(
+        bits ? preintegration::subdivided(in.entries, 1 << bits) : in.entries, 1);
+    const double step = std::ldexp(in.step_world, -bits);
+    m.moment = Table(tables.size(), 3);
     m.moment.wire = static_cast<int>(Wire::table_moment);
     for (int c = 0; c < 3; ++c)
-        for (int i = 0; i < in.entries.size(); ++i)
-            m.moment.set(
-                i, c,
-                tables.moment[0][static_cast<std::size_t>(c)][static_cast<std::size_t>(i)] * in.step_world,
-                moment);
-    m.to_part = Rescale(moment.format.fraction_bits + in.input_fraction, moment,
-                        static_cast<int>(Wire::table_moment));
+        for (int i = 0; i < tables.size(); ++i)
+            m.moment.set(i, c,
+                         tables.moment[0][static_cast<std::size_t>(c)][static_cast<std::size_t>(i)] * step,
+                         moment);
     m.to_ratio = Rescale(moment.format.fraction_bits - in.specs[Wire::table_extinction].format.fraction_bits,
                          ratio, static_cast<int>(Wire::slab_ratio));
     m.one_ratio = ratio.format.one();

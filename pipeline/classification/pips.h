@@ -5,7 +5,8 @@
 //     - T(s_f))
 //
 // Exact in alpha.  K is the mean colour weighted by extinction: it cannot tell front from back, and errs by
-// x^2 dc / 8 for a colour that changes by dc inside the slab.
+// x^2 dc / 8 for a colour that changes by dc inside the slab.  Between rows the colour is their mean: where
+// that shows, an entry has several rows.
 #ifndef SQUINT_PIPELINE_CLASSIFICATION_PIPS_H
 #define SQUINT_PIPELINE_CLASSIFICATION_PIPS_H
 
@@ -17,14 +18,13 @@ struct PowerSeriesOfOrder1 {
     static constexpr bool kPremultiplied = false;
     static constexpr bool kNeedsBack = true;
     PrefixLookup prefix;
-    Table moment;     // three columns: X[i], colour over depth
-    Rescale to_part;  // the part of X inside an entry
+    Table moment;  // three columns: X[i], colour over depth, a row for every row of T
     Rescale to_ratio;
     std::int64_t one_ratio = 0;
 
     template <class V>
     void visit(V&& v) {
-        prefix.visit(v), v(moment), v(to_part), v(to_ratio);
+        prefix.visit(v), v(moment), v(to_ratio);
     }
     void describe(ClassificationReport& report) const {
         prefix.describe(report);
@@ -52,12 +52,13 @@ template <class W>
 HWY_INLINE Slab<W> classify(const PowerSeriesOfOrder1& m, W front, W back, W length) {
     const CutSlab<W> cut = cut_at_wall(m.prefix, front, back);
     const SlabDepth<W> d = slab_depth(m.prefix, cut, length);
-    const W some = max(d.difference, constant<W>(1)), one = constant<W>(m.one_ratio);
+    const W some = max(d.straight, constant<W>(1)), one = constant<W>(m.one_ratio);
+    const int bits = m.prefix.place_bits();
     Slab<W> slab;
     slab.alpha = opacity_of_depth(m.prefix.entries.opacity, d.depth);
     for (int c = 0; c < 3; ++c) {
-        const W colored = absolute(prefix_at(m.moment, cut.end, c, m.to_part) -
-                                   prefix_at(m.moment, cut.front, c, m.to_part));
+        const W colored =
+            absolute(prefix_at(m.moment, d.end, c, bits) - prefix_at(m.moment, d.front, c, bits));
         slab.color[static_cast<std::size_t>(c)] = min(divide(colored, some, m.to_ratio), one);
     }
     return finish_straight(m.prefix, cut, front, length, slab);

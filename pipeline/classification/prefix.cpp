@@ -1,35 +1,76 @@
 #include "pipeline/classification/prefix.h"
 
+#include "pipeline/preintegration/linear_entries.h"
 #include "pipeline/preintegration/opaque_prediction.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace squint {
 
-PrefixLookup build_prefix_lookup(const ClassificationInputs& in) {
+namespace {
+
+// A straight T errs by half the change of extinction over a row in a slab of one last bit at its end: half an
+// LSB8 of opacity is left.
+constexpr double kStraightEnough = 1.0 / 255;
+
+}  // namespace
+
+int sub_entry_bits_for_color(const ClassificationInputs& in, int most_rows) {
+    double worst = 0;
+    for (int i = 0; i + 1 < in.entries.size(); ++i) {
+        const Entry &a = in.entries.entry[static_cast<std::size_t>(i)],
+                    &b = in.entries.entry[static_cast<std::size_t>(i) + 1];
+        const Vec3 step = b.color - a.color;
+        const double swing = std::max({std::abs(step.x), std::abs(step.y), std::abs(step.z)});
+        // The mean weighted by extinction is at most two thirds of the swing away from either end.
+        if (swing > 0)
+            worst =
+                std::max(worst, swing * 2 / 3 *
+                                    -portable::expm1(-std::max(a.extinction, b.extinction) * in.step_world));
+    }
+    int bits = 0;
+    while (std::ldexp(worst, -bits) > kInsideEntry && bits < in.input_fraction &&
+           (in.entries.size() - 1) << (bits + 1) <= most_rows)
+        ++bits;
+    return bits;
+}
+
+PrefixLookup build_prefix_lookup(const ClassificationInputs& in, int sub_entry_bits) {
     PrefixLookup p;
     p.entries = build_entry_lookup(in);
     const Spec extinction = in.specs[Wire::table_extinction], depth = in.specs[Wire::slab_depth];
     const int n = in.entries.size();
-    p.depth = Table(n, 1);
-    p.depth.wire = static_cast<int>(Wire::table_extinction);
-    double sum = 0;  // trapezoids: exact for a linear extinction
-    for (int i = 0; i + 1 < n; ++i)
-        sum += 0.5 * (in.entries.entry[static_cast<std::size_t>(i)].extinction +
-                      in.entries.entry[static_cast<std::size_t>(i) + 1].extinction);
-    require_range(in.specs, Wire::table_extinction, sum * in.step_world,
+    const Entries fine =
+        sub_entry_bits ? preintegration::subdivided(in.entries, 1 << sub_entry_bits) : in.entries;
+    const double step = std::ldexp(in.step_world, -sub_entry_bits);
+    const int rows = fine.size();
+    p.sub_entry_bits = sub_entry_bits;
+    double total = 0, bend = 0;
+    for (int i = 0; i + 1 < rows; ++i) {
+        const double a = fine.entry[static_cast<std::size_t>(i)].extinction,
+                     b = fine.entry[static_cast<std::size_t>(i) + 1].extinction;
+        total += 0.5 * (a + b), bend = std::max(bend, std::abs(b - a));
+    }
+    p.curved = bend * in.step_world > kStraightEnough && p.place_bits() > 0;
+    require_range(in.specs, Wire::table_extinction, total * step,
                   "the prefix sums of the entries' optical depths");
-    sum = 0;
-    for (int i = 0; i < n; ++i) {
-        p.depth.set(i, 0, sum * in.step_world, extinction);
-        if (i + 1 < n)
-            sum += 0.5 * (in.entries.entry[static_cast<std::size_t>(i)].extinction +
-                          in.entries.entry[static_cast<std::size_t>(i) + 1].extinction);
+    p.depth = Table(rows, p.curved ? 2 : 1);
+    p.depth.wire = static_cast<int>(Wire::table_extinction);
+    Spec signed_extinction = extinction;
+    signed_extinction.format.is_signed = true;
+    double sum = 0;  // trapezoids: exact for a linear extinction
+    for (int i = 0; i < rows; ++i) {
+        p.depth.set(i, 0, sum * step, extinction);
+        p.total = p.depth.word(i, 0);
+        if (i + 1 == rows) break;
+        const double a = fine.entry[static_cast<std::size_t>(i)].extinction,
+                     b = fine.entry[static_cast<std::size_t>(i) + 1].extinction;
+        sum += 0.5 * (a + b);
+        if (p.curved) p.depth.set(i, 1, (b - a) * step, signed_extinction);
     }
     const int wire = static_cast<int>(Wire::slab_depth);
-    p.to_part = Rescale(extinction.format.fraction_bits + in.input_fraction, extinction,
-                        static_cast<int>(Wire::table_extinction));
-    p.to_depth = Rescale(extinction.format.fraction_bits - in.input_fraction, depth, wire);
+    p.to_depth = Rescale(extinction.format.fraction_bits + p.gained_bits() - in.input_fraction, depth, wire);
     p.to_shorter = Rescale(depth.format.fraction_bits + p.entries.length_fraction, depth, wire);
     p.to_wall = Rescale(p.entries.color_fraction + p.entries.alpha_fraction, in.specs[Wire::slab_ratio],
                         static_cast<int>(Wire::slab_ratio));

@@ -7,24 +7,33 @@
 
 namespace squint {
 
-/// T at every entry, for one full step a unit of the coordinate, and the nearest opaque entries.
+/// T at every entry, for one full step a unit of the coordinate, and the nearest opaque entries.  Between
+/// entries T is evaluated exactly, with the fraction bits that takes, and rounded with the slab's depth
+/// alone.
 struct PrefixLookup {
     EntryLookup entries;
-    Table depth;         // one column: T[i]; straight between entries
-    Rescale to_part;     // the part of T inside an entry
-    Rescale to_depth;    // slab's depth: (T(b) - T(f)) / |s_b - s_f|
-    Rescale to_shorter;  // times the slab's length
-    Rescale to_wall;     // colour in front of a wall over the wall's
+    Table depth;             // T[i]; where `curved`, also the change of extinction to the next row
+    int sub_entry_bits = 0;  // 2^bits rows an entry
+    bool curved = false;     // T bends between rows: extinction is linear there; else straight
+    std::int64_t total = 0;  // the last T; rounding a bend may pass it by a part of a last bit
+    Rescale to_depth;        // slab's depth: (T(b) - T(f)) / |s_b - s_f|
+    Rescale to_shorter;      // times the slab's length
+    Rescale to_wall;         // colour in front of a wall over the wall's
     bool predicts = false;
     Table walls;  // up, down: the nearest opaque entry at or above, at or below; absent where none is opaque
 
     template <class V>
     void visit(V&& v) {
-        entries.visit(v), v(depth), v(to_part), v(to_depth), v(to_shorter), v(to_wall), v(walls);
+        entries.visit(v), v(depth), v(to_depth), v(to_shorter), v(to_wall), v(walls);
     }
+    /// Fraction bits of a place between two rows, and those that T gains there.
+    int place_bits() const { return entries.input_fraction - sub_entry_bits; }
+    int gained_bits() const { return curved ? 2 * place_bits() + 1 : place_bits(); }
     void describe(ClassificationReport& report) const {
         entries.describe(report);
-        report.add("T", depth, "prefix sum of the entries' optical depths");
+        report.add("T", depth,
+                   curved ? "prefix sum of the entries' optical depths, and their bend"
+                          : "prefix sum of the entries' optical depths");
         report.add("walls", walls, "nearest opaque entry above and below");
         if (entries.has_opaque)
             report.notes.push_back(predicts
@@ -33,7 +42,12 @@ struct PrefixLookup {
     }
 };
 
-PrefixLookup build_prefix_lookup(const ClassificationInputs& inputs);
+PrefixLookup build_prefix_lookup(const ClassificationInputs& inputs, int sub_entry_bits = 0);
+
+/// log2 of the sub-entries an entry needs so that a colour constant inside them errs by kInsideEntry at most
+/// in any slab of one step, as far as `most_rows` rows and the input's fraction bits allow.
+int sub_entry_bits_for_color(const ClassificationInputs& inputs, int most_rows);
+inline constexpr double kInsideEntry = 2.0 / 255;
 
 /// What methods with premultiplied colours share.
 struct PremultipliedRules {
@@ -74,20 +88,44 @@ HWY_INLINE W divide(W numerator, W denominator, const Rescale& to) {
     return quotient(numerator, shift_left(denominator, to.shift), whole);
 }
 
-/// A prefix sum at a position: P[i] + q(f (P[i+1] - P[i])).
+/// A prefix sum at a position, straight between rows and exact: `bits` more fraction bits than its words.
 template <class W>
-HWY_INLINE W prefix_at(const Table& table, const EntryPosition<W>& at, int column, const Rescale& to_part) {
-    const W here = gather(table, at.entry, column);
-    return within(
-        here + quantise(at.fraction * (gather(table, at.entry + constant<W>(1), column) - here), to_part), 0,
-        to_part.highest);
+HWY_INLINE W prefix_at(const Table& table, const EntryPosition<W>& at, int column, int bits) {
+    return blend(gather(table, at.entry, column), gather(table, at.entry + constant<W>(1), column),
+                 at.fraction, bits);
+}
+
+/// Where an input stands between two sub-entries.
+template <class W>
+HWY_INLINE EntryPosition<W> sub_entry_position(const EntryLookup& e, int sub_entry_bits, W input) {
+    const int bits = e.input_fraction - sub_entry_bits;
+    const std::int64_t last = (static_cast<std::int64_t>(e.last_segment + 1) << sub_entry_bits) - 1;
+    const W entry = min(floor_shift(input, bits), constant<W>(last));
+    return {entry, min(input - shift_left(entry, bits), constant<W>(std::int64_t{1} << bits))};
+}
+
+/// T, exact with gained_bits() more fraction bits than its words.  With tau linear over a row's reach,
+///
+///     T(u) = T_i + u (T_(i+1) - T_i) - u (1 - u) / 2 (tau_(i+1) - tau_i),    0 <= u <= 1.
+template <class W>
+HWY_INLINE W curved_from(const PrefixLookup& p, const EntryPosition<W>& at, W straight) {
+    if (!p.curved) return straight;
+    const int bits = p.place_bits();
+    const std::int64_t one = std::int64_t{1} << bits;
+    const W hollow = within(at.fraction * (constant<W>(one) - at.fraction), 0, one * one / 4);
+    return within(shift_left(straight, bits + 1) - hollow * gather(p.depth, at.entry, 1), 0,
+                  (p.total + 1) << p.gained_bits());
+}
+template <class W>
+HWY_INLINE W depth_at(const PrefixLookup& p, const EntryPosition<W>& at) {
+    return curved_from(p, at, prefix_at(p.depth, at, 0, p.place_bits()));
 }
 
 /// A slab cut where it first meets an opaque entry: in either direction, both ends included.
 template <class W>
 struct CutSlab {
     EntryPosition<W> front, end;  // the translucent part
-    W end_input;                  // its end as an input
+    W front_input, end_input;     // its ends as inputs
     W span;                       // |s_b - s_f| of the whole slab: the rate is kept
     W wall;                       // 1 where an opaque entry ends it
     W wall_entry;
@@ -96,7 +134,7 @@ template <class W>
 HWY_INLINE CutSlab<W> cut_at_wall(const PrefixLookup& p, W front, W back) {
     const int bits = p.entries.input_fraction;
     const W zero = constant<W>(0), one = constant<W>(1);
-    CutSlab<W> cut{entry_position(p.entries, front), {}, back, absolute(back - front), zero, zero};
+    CutSlab<W> cut{entry_position(p.entries, front), {}, front, back, absolute(back - front), zero, zero};
     W end = back;
     if (p.predicts) {
         const auto ascending = front < back;
@@ -117,8 +155,10 @@ HWY_INLINE CutSlab<W> cut_at_wall(const PrefixLookup& p, W front, W back) {
 /// The optical depth of a cut slab, and T's difference that it comes from.
 template <class W>
 struct SlabDepth {
-    W difference;  // |T(end) - T(front)|
-    W depth;       // times length over span
+    EntryPosition<W> front, end;  // in rows of T
+    W straight;                   // |T(end) - T(front)| without T's bend between rows
+    W difference;                 // with it
+    W depth;                      // times length over span
 };
 /// The optical depth of a difference of T over a span of inputs, for a slab of `length`.
 template <class W>
@@ -130,9 +170,16 @@ HWY_INLINE W depth_of(const PrefixLookup& p, W difference, W span, W length) {
 }
 template <class W>
 HWY_INLINE SlabDepth<W> slab_depth(const PrefixLookup& p, const CutSlab<W>& cut, W length) {
-    const W difference =
-        absolute(prefix_at(p.depth, cut.end, 0, p.to_part) - prefix_at(p.depth, cut.front, 0, p.to_part));
-    return {difference, depth_of(p, difference, cut.span, length)};
+    SlabDepth<W> d;
+    d.front = sub_entry_position(p.entries, p.sub_entry_bits, cut.front_input);
+    d.end = sub_entry_position(p.entries, p.sub_entry_bits, cut.end_input);
+    const W front = prefix_at(p.depth, d.front, 0, p.place_bits()),
+            end = prefix_at(p.depth, d.end, 0, p.place_bits());
+    d.straight = absolute(end - front);
+    d.difference =
+        p.curved ? absolute(curved_from(p, d.end, end) - curved_from(p, d.front, front)) : d.straight;
+    d.depth = depth_of(p, d.difference, cut.span, length);
+    return d;
 }
 
 /// The straight colour of the wall that ends a slab.

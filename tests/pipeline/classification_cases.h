@@ -77,7 +77,7 @@ inline Classifier make_classifier(const Entries& entries, MethodCase which, cons
         deepest = std::max(deepest, e.extinction);
         total += e.opaque ? std::max(e.extinction, 1 / step) : e.extinction;
     }
-    in.depth_bits = bits_for(deepest * step), in.total_depth_bits = bits_for(total * step);
+    in.depth_bits = bits_for(deepest * step), in.total_depth_bits = bits_for(std::max(total, deepest) * step);
     Classifier c{entries, {}, {}, {}, 0, 0, 0, 0, false};
     preset_specs(preset, in, c.specs);
     c.settings.method = which.method, c.settings.order = which.order;

@@ -2,6 +2,7 @@
 #include "pipeline/gradient.h"
 
 #include "fixedpoint/words.h"
+#include "pipeline/presets.h"
 
 #include <gtest/gtest.h>
 
@@ -111,6 +112,35 @@ TEST(Gradient, AMirroredFieldHasTheMirroredGradient) {
     const auto down = neighbourhood_of([](int x, int, int) { return Word{x < 0}; });
     EXPECT_EQ(gradient_of(floor, up, {0, 0, 0})[0], 0);
     EXPECT_EQ(gradient_of(floor, down, {0, 0, 0})[0], -1);
+}
+
+// C3.4 in the preset's own formats: a mirrored volume has the mirrored gradient, bit for bit.
+TEST(Gradient, ThePresetDefaultIsOddInTheField) {
+    std::mt19937_64 random(11);
+    for (const int scalar_bits : {8, 12, 16}) {
+        WireSpecs specs;
+        ASSERT_TRUE(preset_specs("default", {.scalar_bits = scalar_bits}, specs));
+        const int weight = specs[Wire::weight].format.fraction_bits,
+                  lerp = specs[Wire::gradient_lerp].format.fraction_bits;
+        for (const GradientRule rule : kVoxelRules) {
+            GradientStage s;
+            s.rule = rule, s.weight_bits = weight;
+            const int gained = rule == GradientRule::central ? 1 : rule == GradientRule::sobel ? 5 : 0;
+            s.to_first = Rescale(gained + weight, specs[Wire::gradient_lerp]);
+            s.to_second = Rescale(lerp + weight, specs[Wire::gradient_lerp]);
+            s.to_gradient = Rescale(lerp + weight, specs[Wire::gradient]);
+            for (int i = 0; i < 2000; ++i) {
+                Neighbourhood<Word> n, negative;
+                for (std::size_t j = 0; j < 64; ++j)
+                    n.voxel[j] = static_cast<Word>(random() % (1u << scalar_bits)),
+                    negative.voxel[j] = -n.voxel[j];
+                // Few distinct weights, so that halves come up.
+                const auto place = [&] { return static_cast<Word>(random() % 9) << (weight - 3); };
+                const Vector w{place(), place(), place()}, there = gradient_of(s, n, w);
+                ASSERT_EQ(gradient_of(s, negative, w), (Vector{-there[0], -there[1], -there[2]}));
+            }
+        }
+    }
 }
 
 // C3.5
