@@ -141,6 +141,31 @@ TEST_F(SweepProgram, RefusesWhatItCannotReadInOneLine) {
     expect_refusal(squint("sweep s.toml --shard 4/3"), "--shard");
 }
 
+// Those of real volumes only where the volumes are.
+TEST_F(SweepProgram, ReadsEveryShippedSweepAndItsScenes) {
+    const fs::path source = SQUINT_SOURCE_DIR;
+    const char* given = std::getenv("SQUINT_DATA");
+    const fs::path data = given ? fs::path(given) : source / "../shared/data";
+    const bool has_data = fs::exists(data / "cthead_256x256x113_u16.nrrd");
+    int read = 0;
+    for (const auto& entry : fs::directory_iterator(source / "configs/sweeps")) {
+        if (entry.path().extension() != ".toml") continue;
+        ++read;
+        const std::string text = contents(entry.path()), name = entry.path().filename();
+        EXPECT_TRUE(text.starts_with("# ")) << name;
+        EXPECT_NE(text.find("\n#   squint sweep configs/sweeps/" + name + " "), std::string::npos)
+            << name << " does not say its command";
+        EXPECT_NE(text.find("What to look for:"), std::string::npos) << name;
+        if (text.find("../bench/") != std::string::npos && !has_data) continue;
+        const Outcome outcome =
+            shell("SQUINT_DATA='" + fs::absolute(data).string() + "' \"$SQUINT\" sweep '" +
+                  entry.path().string() + "' --dry-run --set image.width=4 --set image.height=4");
+        EXPECT_EQ(outcome.code, 0) << outcome.err;
+        EXPECT_NE(outcome.out.find(" points, "), std::string::npos) << name;
+    }
+    EXPECT_GE(read, 8);
+}
+
 // Killed at 50 moments, gone on with each time: every point is there, once, whole, and what it should be.
 TEST_F(SweepProgram, EndsWithEveryPointWhereverItWasKilled) {
     write("s.toml", kBase +
