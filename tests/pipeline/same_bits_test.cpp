@@ -63,7 +63,8 @@ std::shared_ptr<const Volume> draw_volume(Draw& draw, Scene& scene) {
     const auto which =
         static_cast<std::size_t>(draw.between(0, static_cast<std::int64_t>(fields.size()) + 1));
     const ProceduralField& field = which < fields.size() ? fields[which] : noise;
-    const Index3 dims(draw.between(8, 33), draw.between(8, 33), draw.between(8, 33));
+    const Index3 dims{draw.between(8, 33), draw.between(8, 33),
+                      draw.between(8, 33)};  // braces: in that order
     const int bits = draw.one_of({8, 8, 12, 12, 16, 5});
     const Vec3 spacing = draw.once_in(3) ? Vec3(1, 1, 1) : draw.vector(0.3, 2.5);
     scene.volume.procedural = field.name;  // for the message: `noise` is this file's own
