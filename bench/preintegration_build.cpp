@@ -5,8 +5,12 @@
 #include <cstdint>
 #include <vector>
 
+#include <fmt/format.h>
+
+#include "pipeline/classification/methods.h"
 #include "pipeline/preintegration/pi2d.h"
 #include "pipeline/preintegration/prefix_tables.h"
+#include "pipeline/presets.h"
 
 namespace {
 
@@ -32,6 +36,42 @@ void BuildPrefixTables(benchmark::State& state) {
     }
 }
 BENCHMARK(BuildPrefixTables)->Args({256, 1})->Args({4096, 1})->Args({4096, 2})->Unit(benchmark::kMicrosecond);
+
+/// From control points to a method's quantised words in the preset `default`: what a change of the transfer
+/// function costs.  Range 0: entries; range 1: the method; range 2: its order.
+void BuildWords(benchmark::State& state) {
+    const int size = static_cast<int>(state.range(0));
+    const auto method = static_cast<Method>(state.range(1));
+    TransferFunction function;
+    for (int i = 0; i <= 8; ++i) {
+        const double value = static_cast<double>(i) / 8 * (size - 1);
+        function.color.push_back({value, {i / 8.0, 1 - i / 8.0, 0.5}});
+        function.opacity.push_back({value, i % 2 ? 0.6 : 0.05});
+    }
+    function.entries = size;
+    Volume volume;
+    volume.scalar_bits = size > 256 ? 12 : 8;
+    volume.largest = (1 << volume.scalar_bits) - 1;
+    WireSpecs specs;
+    preset_specs("default", {.scalar_bits = volume.scalar_bits, .entry_bits = volume.scalar_bits}, specs);
+    ClassificationSettings settings;
+    settings.method = method, settings.order = static_cast<int>(state.range(2)), settings.table_size = size;
+    const int fraction = specs[Wire::classification_input].format.fraction_bits;
+    for (auto _ : state) {
+        const Entries entries = sample_entries(function, volume);
+        const ClassificationMethod built = build_method({entries, specs, settings, 1, fraction});
+        benchmark::DoNotOptimize(&built);
+    }
+    state.SetLabel(fmt::format("{} {}", name_of(method), settings.order));
+}
+void every_method_and_size(benchmark::internal::Benchmark* b) {
+    for (const int size : {256, 4096}) {
+        for (const Method method : {Method::pc, Method::pi1d}) b->Args({size, static_cast<int>(method), 1});
+        for (const int order : {1, 3}) b->Args({size, static_cast<int>(Method::pips), order});
+        b->Args({size, static_cast<int>(Method::leg), 2});
+    }
+}
+BENCHMARK(BuildWords)->Apply(every_method_and_size)->Unit(benchmark::kMicrosecond);
 
 /// From entries to 16-bit words in a buffer that is used again.
 void BuildPi2d(benchmark::State& state) {

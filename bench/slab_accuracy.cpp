@@ -1,6 +1,6 @@
-// The accuracy study of the classification methods: every method against the exact slab integral, in double,
-// colour and alpha errors in LSB8 (1/255).  JSON on stdout; `--markdown` prints the tables of
-// docs/measurements/slab-accuracy.md instead.
+// The accuracy study of the classification methods: every method against the exact slab integral, colour and
+// alpha errors in LSB8 (1/255), in double, or with `--words PRESET` in a preset's words.  JSON on stdout;
+// `--markdown` prints the tables of docs/measurements/slab-accuracy.md instead.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -11,12 +11,14 @@
 #include <string>
 #include <vector>
 
+#include "core/error.h"
 #include "pipeline/preintegration/exact_slab.h"
 #include "pipeline/preintegration/leg.h"
 #include "pipeline/preintegration/pc.h"
 #include "pipeline/preintegration/pi1d.h"
 #include "pipeline/preintegration/pi2d.h"
 #include "pipeline/preintegration/pips.h"
+#include "tests/pipeline/classification_cases.h"
 
 namespace {
 
@@ -143,6 +145,29 @@ std::vector<std::pair<std::string, Method>> methods(const Entries& entries) {
     return list;
 }
 
+/// The same in fixed point: tables and words of a preset, built for each of the four lengths.  What a method
+/// refuses is left out.
+std::vector<std::pair<std::string, Method>> methods_in_words(const Entries& entries,
+                                                             const std::string& preset) {
+    std::vector<std::pair<std::string, Method>> list;
+    for (const cases::MethodCase& which : cases::all_methods()) {
+        const bool table =
+            which.method == squint::Method::pi2d || which.method == squint::Method::pi2d_no_attenuation;
+        const int size = table ? std::min(entries.size(), 1024) : 0;
+        try {
+            auto built = std::make_shared<std::vector<cases::Classifier>>();
+            for (const double step : {0.25, 0.5, 1.0, 2.0})
+                built->push_back(cases::make_classifier(entries, which, preset, size, step));
+            list.emplace_back(which.name() + (table ? " " + std::to_string(size) : ""), [=](const Slab& s) {
+                const int at = s.length < 0.4 ? 0 : s.length < 0.8 ? 1 : s.length < 1.5 ? 2 : 3;
+                return (*built)[static_cast<std::size_t>(at)].slab(s.front, s.back);
+            });
+        } catch (const InputError&) {
+        }
+    }
+    return list;
+}
+
 struct Error {
     double color_rms, color_max, alpha_rms, alpha_max;
 };
@@ -212,10 +237,13 @@ void print_markdown(const std::vector<Row>& rows) {
         for (std::size_t i = 0; i < columns.size(); ++i) std::printf("---|");
         for (const auto& name : names) {
             std::printf("\n| %s |", name.c_str());
-            for (std::size_t i = begin; i < end; ++i)
-                if (rows[i].method == name)
-                    std::printf(" %s/%s |", lsb8(rows[i].error.color_rms).c_str(),
-                                lsb8(rows[i].error.color_max).c_str());
+            for (const auto& column : columns) {
+                std::string cell = "refused";
+                for (std::size_t i = begin; i < end; ++i)
+                    if (rows[i].method == name && rows[i].function == column)
+                        cell = lsb8(rows[i].error.color_rms) + "/" + lsb8(rows[i].error.color_max);
+                std::printf(" %s |", cell.c_str());
+            }
         }
         std::printf("\n");
         begin = end;
@@ -225,8 +253,14 @@ void print_markdown(const std::vector<Row>& rows) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    std::string preset;
+    bool markdown = false;
+    for (int i = 1; i < argc; ++i) {
+        if (std::strcmp(argv[i], "--markdown") == 0) markdown = true;
+        if (std::strcmp(argv[i], "--words") == 0 && i + 1 < argc) preset = argv[++i];
+    }
     std::vector<Row> rows;
-    for (const int bits : {8, 12, 16}) {
+    for (const int bits : preset.empty() ? std::vector{8, 12, 16} : std::vector{8, 12}) {
         const int size = 1 << bits;
         struct Reach {
             const char* name;
@@ -235,7 +269,9 @@ int main(int argc, char** argv) {
         };
         const auto list = functions(size);
         std::vector<std::vector<std::pair<std::string, Method>>> built;
-        for (const auto& function : list) built.push_back(methods(function.entries));
+        for (const auto& function : list)
+            built.push_back(preset.empty() ? methods(function.entries)
+                                           : methods_in_words(function.entries, preset));
         for (const Reach& reach : {Reach{"slabs up to 2 % of the range", 0.02, bits == 16 ? 200 : 1000},
                                    Reach{"jumps over the range", 1,
                                          bits == 8    ? 1000
@@ -251,7 +287,7 @@ int main(int argc, char** argv) {
             }
         }
     }
-    if (argc > 1 && std::strcmp(argv[1], "--markdown") == 0)
+    if (markdown)
         print_markdown(rows);
     else
         print_json(rows);

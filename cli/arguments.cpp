@@ -284,12 +284,13 @@ void add_doctor(CLI::App& app, DoctorArguments& a) {
 void add_hard(CLI::App& app, HardArguments& a) {
     CLI::App& verb = *app.add_subcommand(
         "hard", "Classify hard transfer functions with every method: errors against the exact integral");
-    verb.add_option("scenes", a.scenes, "Scene files, and folders of them")
-        ->type_name("SCENE.toml|FOLDER")
-        ->required();
+    verb.add_option("scenes", a.scenes,
+                    "Scene files, and folders of them; default: the cases of configs/hard")
+        ->type_name("SCENE.toml|FOLDER");
     add_set(verb, a.overrides, "Set a key of every scene; may be repeated, the last wins");
     add_json_flag(verb, a.json);
-    verb.footer("Example:\n  squint hard configs/hard --set precision.preset=wide");
+    verb.footer(
+        "Examples:\n  squint hard\n  squint hard configs/hard/spike.toml --set precision.preset=wide");
 }
 
 void add_table(CLI::App& app, TableArguments& a) {
@@ -519,7 +520,7 @@ Arguments parse(int argc, char** argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::CallForHelp&) {
-        return Text{chosen().empty() ? app.help() : app.get_subcommands()[0]->help()};
+        return Text{chosen().empty() ? app.help() : app.get_subcommands()[0]->help("squint")};
     } catch (const CLI::CallForVersion&) {
         return Text{"squint " + version() + "\n"};
     } catch (const CLI::ParseError& error) {
@@ -542,7 +543,7 @@ Arguments parse(int argc, char** argv) {
     if (verb == "help" && !about.empty()) {
         const auto of = app.get_subcommands([&](const CLI::App* each) { return each->get_name() == about; });
         if (of.empty()) throw InputError(fmt::format("help: no verb \"{}\"; squint help lists them", about));
-        return Text{of[0]->help()};
+        return Text{of[0]->help("squint")};
     }
     if (verb == "help") return Text{app.help()};
     throw InputError("no verb given; squint help lists them");

@@ -16,8 +16,18 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
+/// The scenes of configs/hard as they were when the program was built: name, text.
+constexpr std::pair<const char*, const char*> kCases[] = {
+#include "hard_cases.inc"
+};
+
+struct Case {
+    std::string name;
+    Scene scene;
+};
+
 /// Scene files as given, and those of folders in order of name.
-std::vector<std::string> scenes_of(const std::vector<std::string>& names) {
+std::vector<std::string> files_of(const std::vector<std::string>& names) {
     std::vector<std::string> scenes;
     for (const std::string& name : names) {
         if (!fs::exists(name)) throw InputError(name + ": no such file or folder");
@@ -33,6 +43,16 @@ std::vector<std::string> scenes_of(const std::vector<std::string>& names) {
         scenes.insert(scenes.end(), found.begin(), found.end());
     }
     return scenes;
+}
+
+std::vector<Case> cases_of(const HardArguments& a) {
+    std::vector<Case> cases;
+    if (a.scenes.empty())
+        for (const auto& [name, text] : kCases)
+            cases.push_back({name, parse_scene(text, std::string(name) + ".toml", "", a.overrides)});
+    for (const std::string& file : files_of(a.scenes))
+        cases.push_back({fs::path(file).stem().string(), read({file, a.overrides})});
+    return cases;
 }
 
 struct Outcome {
@@ -75,11 +95,9 @@ int run(const HardArguments& a) {
     Json json = Json::object();
     std::string remarks;
     int beyond = 0;
-    for (const std::string& file : scenes_of(a.scenes)) {
-        const Scene scene = read({file, a.overrides});
+    for (const auto& [name, scene] : cases_of(a)) {
         std::vector<std::string> notes;
         const auto volume = load(scene, notes);
-        const std::string name = fs::path(file).stem().string();
         rows.push_back({name});
         for (const NamedMethod& method : methods) {
             const Outcome outcome = outcome_of(scene, method, volume);

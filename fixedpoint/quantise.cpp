@@ -11,8 +11,9 @@ std::int64_t quantise_real(double x, const Spec& spec) {
     // below a half.
     const double scaled = x * static_cast<double>(spec.format.one());
     if (!(std::abs(scaled) < 0x1p62)) return x < 0 ? limits.lowest : limits.highest;
-    const double below = std::floor(scaled), rest = scaled - below;
-    std::int64_t raw = static_cast<std::int64_t>(below);
+    std::int64_t raw = static_cast<std::int64_t>(scaled);  // towards zero; the floor without a call
+    raw -= static_cast<double>(raw) > scaled;
+    const double rest = scaled - static_cast<double>(raw);
     if (spec.rounding == Rounding::rnd) raw += rest >= 0.5;
     if (spec.rounding == Rounding::rnd_conv) raw += rest > 0.5 || (rest == 0.5 && (raw & 1));
     if (spec.rounding == Rounding::trn_zero) raw += rest > 0 && raw < 0;

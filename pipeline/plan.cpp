@@ -288,6 +288,9 @@ void plan_shading(Plan& plan) {
                               plan.specs[Wire::power]);
     }
     s.power_table.wire = wire_index(Wire::power);
+    if (plan.lit && s.power_table.rows() > 0)
+        plan.tables.push_back({"power", s.power_table.rows(), s.power_table.columns(),
+                               static_cast<std::int64_t>(s.power_table.bytes()), "x^p over N.H"});
     s.to_light = rescale(plan, s.light_fraction, Wire::light);
     s.to_dot = rescale(plan, s.normal_fraction + s.light_fraction, Wire::dot);
     s.to_light_view = rescale(plan, 2 * s.light_fraction, Wire::dot);

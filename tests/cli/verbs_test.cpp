@@ -23,6 +23,7 @@ TEST_F(Verbs, EachHasHelpWithAnExample) {
     for (const char* verb : {"render", "plan", "pixel", "number", "compare", "info", "volume", "doctor"}) {
         EXPECT_THAT(all.out, HasSubstr(verb));
         const Outcome help = squint(std::string(verb) + " --help");
+        EXPECT_NE(help.out.find("Usage: squint " + std::string(verb)), std::string::npos) << verb;
         EXPECT_EQ(help.code, 0);
         EXPECT_THAT(help.out, HasSubstr("Example")) << verb;
         EXPECT_THAT(help.out, HasSubstr(std::string("  squint ") + verb)) << verb;
@@ -212,6 +213,17 @@ TEST_F(Verbs, DoctorFindsThisInstallationWell) {
     EXPECT_EQ(r.code, 0) << r.out;
     for (const char* part : {"OpenImageIO", "Highway", "TBB", "teem", "SIMD targets", "as expected"})
         EXPECT_THAT(r.out, HasSubstr(part));
+}
+
+class HardVerb : public Program {};
+
+TEST_F(HardVerb, WithoutArgumentsTakesTheShippedCases) {
+    int files = 0;
+    for (const auto& entry : fs::directory_iterator(SQUINT_SOURCE_DIR "/configs/hard"))
+        files += entry.path().extension() == ".toml";
+    const auto scenes = squint("hard --json --set transfer_function.entries=64").json()["scenes"];
+    EXPECT_EQ(scenes.size(), static_cast<std::size_t>(files));
+    for (const auto& scene : scenes) EXPECT_EQ(scene.size(), 13u);
 }
 
 TEST_F(Verbs, SceneReferencePrintsEveryKey) {
