@@ -113,20 +113,27 @@ class Blur {
     std::size_t out_width() const { return out_width_; }
 
     void load(std::span<const double> values) {
-        for (std::size_t y = 0; y < lines_.size(); ++y) {
-            std::fill(lines_[y].begin(), lines_[y].end(), 0.0);
-            for (std::size_t k = 0; k < kWindow; ++k)
-                accumulate(lines_[y], weight_[k], values.subspan(y * width_ + k, out_width_));
-        }
+        for (std::size_t y = 0; y < lines_.size(); ++y)
+            weigh(lines_[y], [&](std::size_t k) { return values.data() + y * width_ + k; });
     }
     void row(std::size_t y, std::vector<double>& mean) const {
-        mean.assign(out_width_, 0.0);
-        for (std::size_t k = 0; k < kWindow; ++k) accumulate(mean, weight_[k], lines_[y + k]);
+        mean.resize(out_width_);
+        weigh(mean, [&](std::size_t k) { return lines_[y + k].data(); });
     }
 
   private:
-    static void accumulate(std::span<double> into, double weight, std::span<const double> values) {
-        for (std::size_t x = 0; x < into.size(); ++x) into[x] += weight * values[x];
+    /// into[x] = sum of weight[k] taps(k)[x], in that order: vectors along x, eleven products in a register.
+    template <class Taps>
+    void weigh(std::vector<double>& into, Taps taps) const {
+        std::array<const double*, kWindow> from;
+        for (std::size_t k = 0; k < kWindow; ++k) from[k] = taps(k);
+        const std::array<double, kWindow> weight = weight_;
+        double* __restrict const out = into.data();
+        for (std::size_t x = 0; x < out_width_; ++x) {
+            double sum = 0;
+            for (std::size_t k = 0; k < kWindow; ++k) sum += weight[k] * from[k][x];
+            out[x] = sum;
+        }
     }
 
     std::size_t width_, out_width_;

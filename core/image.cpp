@@ -83,16 +83,28 @@ void check_shape(const Image& image, const std::string& path) {
 
 /// 8-bit sRGB of linear light, half a step rounded up: the number of codes whose lower edge is reached.  NaN
 /// is black.
-std::uint8_t encode_8bit(double linear) {
-    static const std::array<double, 255> edges = [] {
-        std::array<double, 255> edge{};
-        for (int i = 0; i < 255; ++i) edge[static_cast<std::size_t>(i)] = linear_from_srgb((i + 0.5) / 255);
-        return edge;
-    }();
-    const auto above =
-        std::partition_point(edges.begin(), edges.end(), [=](double edge) { return linear >= edge; });
-    return static_cast<std::uint8_t>(above - edges.begin());
-}
+class Encoder {
+  public:
+    Encoder() {
+        for (std::size_t i = 0; i < edge_.size(); ++i)
+            edge_[i] = linear_from_srgb((static_cast<double>(i) + 0.5) / 255);
+        for (std::size_t i = 0; i < first_.size(); ++i)
+            first_[i] = static_cast<std::uint8_t>(
+                std::upper_bound(edge_.begin(), edge_.end(), static_cast<double>(i) / kBuckets) -
+                edge_.begin());
+    }
+    std::uint8_t operator()(double linear) const {
+        if (!(linear > 0)) return 0;
+        std::size_t code = first_[static_cast<std::size_t>(std::min(linear, 1.0) * kBuckets)];
+        while (code < edge_.size() && linear >= edge_[code]) ++code;
+        return static_cast<std::uint8_t>(code);
+    }
+
+  private:
+    static constexpr int kBuckets = 1024;  // of [0, 1]: at most a few edges in each
+    std::array<double, 255> edge_{};
+    std::array<std::uint8_t, kBuckets + 1> first_{};  // code at a bucket's lower end
+};
 
 std::unique_ptr<OIIO::ImageInput> open(const std::string& path) {
     std::error_code ignored;
@@ -180,7 +192,8 @@ void write_exr(const Image& image, const std::string& path, const Attributes& at
           packed.data());  // UNKNOWN: each channel in its own type
 }
 
-void write_preview_png(const Image& image, const std::string& path, const double background[3]) {
+void write_preview_png(const Image& image, const std::string& path, const double background[3], int level) {
+    static const Encoder encode_8bit;
     check_shape(image, path);
     const Channel* alpha = image.find("A");
     std::vector<std::uint8_t> packed(pixels(image) * 3);
@@ -195,6 +208,7 @@ void write_preview_png(const Image& image, const std::string& path, const double
     }
     OIIO::ImageSpec spec(image.width, image.height, 3, OIIO::TypeDesc::UINT8);
     spec.attribute("oiio:ColorSpace", "sRGB");
+    spec.attribute("png:compressionLevel", level);
     write(path, "png", spec, OIIO::TypeDesc::UINT8, packed.data());
 }
 

@@ -33,7 +33,8 @@ using Attributes = std::map<std::string, std::string>;
 void write_exr(const Image& image, const std::string& path, const Attributes& attributes);
 
 /// R G B A premultiplied linear -> over `background` (linear) -> 8-bit sRGB PNG.  Written whole or not at all.
-void write_preview_png(const Image& image, const std::string& path, const double background[3]);
+/// `level`: 1 is quick, 9 small.
+void write_preview_png(const Image& image, const std::string& path, const double background[3], int level = 6);
 
 /// EXR, PNG and whatever else OpenImageIO opens by its extension.  Floats as stored, 8-bit codes as 0 to 1 without decoding;
 /// UINT channels of EXR as words.  Channels come in the order of the reader: find them by name.  Throws InputError.

@@ -486,7 +486,7 @@ Json Evaluator::measure(const Prepared& point, int threads, bool timed) {
     if (!folder_.empty() && m.picture_size > 0) {
         const Vec3& b = point.scene.image.background;
         const double background[3] = {b.x, b.y, b.z};
-        write_preview_png(colors, path("pictures", point.hash + ".png"), background);
+        write_preview_png(colors, path("pictures", point.hash + ".png"), background, 1);
         write_text_whole(path("pictures", point.hash + ".values"), values_file(colors, m.picture_size));
     }
     if (!folder_.empty() && m.exr)
