@@ -141,6 +141,24 @@ TEST_F(SweepProgram, RefusesWhatItCannotReadInOneLine) {
     expect_refusal(squint("sweep s.toml --shard 4/3"), "--shard");
 }
 
+TEST_F(SweepProgram, RunsAsShardsUnderGnuParallelAndAsSlurmTasksWould) {
+    const std::string tools = std::string(SQUINT_SOURCE_DIR) + "/tools/sweeps/";
+    write("s.toml", kBase + "[[axis]]\nwires = ['color']\nfraction_bits = { from = 6, to = 15 }\n");
+    ASSERT_EQ(squint("sweep s.toml -o whole -q").code, 0);
+    for (const char* task : {"1", "2", "3"}) {
+        const Outcome outcome =
+            shell(std::string("export SQUINT; SWEEP=s.toml RUN=slurm SHARDS=3 SLURM_ARRAY_TASK_ID=") + task +
+                  " bash '" + tools + "slurm'");
+        ASSERT_EQ(outcome.code, 0) << outcome.err;
+    }
+    ASSERT_EQ(squint("sweep --collect slurm.1 slurm.2 slurm.3 -o slurm").code, 0);
+    EXPECT_EQ(points("slurm"), points("whole"));
+    if (shell("command -v parallel").code != 0) GTEST_SKIP() << "GNU parallel is not installed";
+    const Outcome outcome = shell("export SQUINT; '" + tools + "gnu-parallel' s.toml run 3");
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_EQ(points("run"), points("whole"));
+}
+
 // Those of real volumes only where the volumes are.
 TEST_F(SweepProgram, ReadsEveryShippedSweepAndItsScenes) {
     const fs::path source = SQUINT_SOURCE_DIR;

@@ -4,14 +4,17 @@
 //
 // SQUINT_SCENES sets how many scenes are drawn, SQUINT_SEED the first one's seed: a failure prints both.
 #include "core/error.h"
+#include "core/hash.h"
 #include "core/procedural.h"
 #include "pipeline/lanes/kernels.h"
+#include "pipeline/record.h"
 #include "pipeline/render.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <random>
@@ -60,7 +63,8 @@ std::shared_ptr<const Volume> draw_volume(Draw& draw, Scene& scene) {
     const auto which =
         static_cast<std::size_t>(draw.between(0, static_cast<std::int64_t>(fields.size()) + 1));
     const ProceduralField& field = which < fields.size() ? fields[which] : noise;
-    const Index3 dims(draw.between(8, 33), draw.between(8, 33), draw.between(8, 33));
+    const Index3 dims{draw.between(8, 33), draw.between(8, 33),
+                      draw.between(8, 33)};  // braces: in that order
     const int bits = draw.one_of({8, 8, 12, 12, 16, 5});
     const Vec3 spacing = draw.once_in(3) ? Vec3(1, 1, 1) : draw.vector(0.3, 2.5);
     scene.volume.procedural = field.name;  // for the message: `noise` is this file's own
@@ -221,7 +225,7 @@ RenderOptions draw_options(Draw& draw) {
 }
 
 /// Empty, or the first difference.
-std::string difference(const Image& expected, const Image& actual) {
+std::string first_difference(const Image& expected, const Image& actual) {
     for (const Channel& channel : expected.channels) {
         const Channel* other = actual.find(channel.name);
         if (!other) return "channel " + channel.name + " is missing";
@@ -254,6 +258,7 @@ TEST(SameBits, RandomScenesHaveTheModelsBitsOnEveryPath) {
     RenderOptions golden;
     golden.threads = 1, golden.path = Path::model;
     unsigned drawn = 0, refused = 0, in_lanes = 0, failures = 0;
+    Hasher pictures;
     for (unsigned seed = first; seed < first + scenes; ++seed) {
         Draw draw(seed + 0x5eed);
         const RenderOptions options = draw_options(draw);
@@ -262,8 +267,9 @@ TEST(SameBits, RandomScenesHaveTheModelsBitsOnEveryPath) {
             const Image model = render(c.plan, golden).image;
             const Rendering fast = render(c.plan, options);
             ++drawn;
+            pictures.text(picture_hash(model));
             in_lanes += fast.statistics.path == "lanes";
-            const std::string wrong = difference(model, fast.image);
+            const std::string wrong = first_difference(model, fast.image);
             if (wrong.empty()) continue;
             ADD_FAILURE() << wrong << "\nseed " << seed << ", target " << options.target << ", threads "
                           << options.threads << ", tile " << options.tile << ", skip " << options.skip << ", "
@@ -277,6 +283,8 @@ TEST(SameBits, RandomScenesHaveTheModelsBitsOnEveryPath) {
     }
     EXPECT_LE(10 * refused, drawn) << "scenes are drawn to be accepted";
     EXPECT_GE(2 * in_lanes, drawn) << "most scenes should run in lanes";
+    // The model's own bits, to be compared between compilers and machines.
+    std::printf("pictures %s\n", pictures.hex().c_str());
     RecordProperty("drawn", static_cast<int>(drawn));
     RecordProperty("in_lanes", static_cast<int>(in_lanes));
 }

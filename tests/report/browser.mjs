@@ -107,7 +107,7 @@ export function overlaps(page) {
   });
 }
 
-/// Texts of the charts' axes, legends and titles that lie on one another or are cut off.
+/// Texts in the charts that lie on one another or are cut off.
 export function overlapsInCharts(page) {
   return page.evaluate(() => {
     const found = [];
@@ -117,7 +117,7 @@ export function overlapsInCharts(page) {
       const walk = (mark, x, y) => {
         for (const item of mark.items ?? []) {
           if (mark.marktype === 'group') for (const inner of item.items) walk(inner, x + (item.x ?? 0), y + (item.y ?? 0));
-          else if (mark.marktype === 'text' && /axis|legend|title/.test(mark.role ?? '') && item.opacity !== 0 && item.text) {
+          else if (mark.marktype === 'text' && item.opacity !== 0 && item.text && !item.stroke) {
             const b = item.bounds;
             texts.push({ text: String(item.text), x1: x + b.x1, x2: x + b.x2, y1: y + b.y1, y2: y + b.y2 });
           }

@@ -1,7 +1,7 @@
 // The page of `squint report` in a headless browser: node browser_test.mjs SQUINT.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { readFileSync, readdirSync, rmSync } from 'node:fs';
+import { readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { cpus, loadavg } from 'node:os';
 import { dirname, join } from 'node:path';
 import { after, before, test } from 'node:test';
@@ -212,6 +212,20 @@ test('a copied command gives the same picture again', async () => {
     const again = JSON.parse(readFileSync(join(is.folder, 'again.json')));
     assert.equal(again.pictures[0].hash, recordOf('product', hash).picture_hash, command);
   }
+  await page.close();
+});
+
+test('a search stands with its formats beside the scene\'s own and those of Squeeze', async () => {
+  is.manyPoints('wires', 'found', 20);
+  const file = join(is.folder, 'found', 'sweep.json'), candidate = (bits, format) => ({ bits, table_bytes: 100, error_lsb8: 0.4, other_views_error_lsb8: 0.45, margin_lsb8: 0.1, other_views_margin_lsb8: 0.05, wires: { color: format } });
+  const search = { max_error_lsb8: 0.5, figure: 'rms', cost: 'bits', trials: 77, pictures: 99, other_degrees: [45], found: candidate(9000, 'u1.9 rnd_conv'), scene: candidate(16000, 'u1.15'), squeeze: candidate(12000, 'u1.14 trn') };
+  writeFileSync(file, JSON.stringify({ ...JSON.parse(readFileSync(file)), search }));
+  const page = await is.open(browser, is.report('found'), 1280), text = await page.innerText('#search');
+  assert.match(text, /at most 0\.5 LSB8 \(rms\).* 77 sets of formats tried in 99 pictures/);
+  assert.match(text, /bits\s+9000\s+16000\s+12000/);
+  assert.match(text, /fewer bits than Squeeze's\s+25 %\s+-33.3 %\s+-/);
+  assert.match(text, /color\s+u1\.9 rnd_conv\s+u1\.15\s+u1\.14 trn/);
+  assert.deepEqual(page.said, []);
   await page.close();
 });
 

@@ -54,7 +54,7 @@ const hash = (text) => `'sha256-${createHash('sha256').update(text, 'utf8').dige
 
 const library = plain(libraries.map(modules).join('\n'));
 // Each after what it calls when it is read; one scope, closed to the page.
-const kScripts = ['data', 'charts', 'pareto', 'sensitivity', 'heat', 'ranges', 'pictures', 'table', 'page'];
+const kScripts = ['data', 'charts', 'pareto', 'sensitivity', 'heat', 'ranges', 'search', 'pictures', 'table', 'page'];
 const script = plain(`'use strict';\n(() => {\n${kScripts.map((name) => read(`page/${name}.js`)).join('\n')}})();\n`);
 const style = modules('img-comparison-slider/dist/styles.css') + read('page/page.css');
 const parts = {

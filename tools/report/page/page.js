@@ -48,7 +48,7 @@ function startControls() {
 
 async function start() {
   await readData();
-  about();
+  about(), search();
   findAxes(), startSensitivity(), startHeat(), startPictures(), startTable(), startControls();
   if (!points.some((p) => p.audit)) $('ranges').hidden = true;
   draw();
