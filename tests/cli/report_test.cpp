@@ -1,0 +1,116 @@
+// squint report as numbers, and what its page is made of.  (How the page works: tests/report, in a browser.)
+#include "program.h"
+
+#include <sstream>
+
+namespace squint::test {
+namespace {
+
+using Json = nlohmann::json;
+
+class ReportProgram : public Program {
+  protected:
+    // 3 points, one of which fails, and a title that asks for quotes.
+    void SetUp() override {
+        Program::SetUp();
+        write(
+            "s.toml",
+            "title = 'Color, \"3\" ways | <b>'\n[base]\nvolume.dims = 12\nimage.width = 12\nimage.height = "
+            "8\n"
+            "camera.height = 12\n[[axis]]\nkey = 'precision.sample'\nvalues = ['u12.4', 'u1.4', 'u12.5']\n");
+        ASSERT_EQ(squint("sweep s.toml -o run -q").code, 3);
+    }
+    std::vector<Json> records() const {
+        std::vector<Json> all;
+        const Json sweep = Json::parse(contents(folder / "run/sweep.json"));
+        for (const auto& entry : sweep["points"])
+            all.push_back(
+                Json::parse(contents(folder / "run/points" / (entry["hash"].get<std::string>() + ".json"))));
+        return all;
+    }
+};
+
+TEST_F(ReportProgram, JsonAndTheRecordsOfPointsSayTheSame) {
+    const Outcome outcome = squint("report run --format json");
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    const Json report = outcome.json();
+    EXPECT_EQ(report["schema"], "squint.report/1");
+    const std::vector<Json> all = records();
+    ASSERT_EQ(report["points"].size(), all.size());
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        const Json& point = report["points"][i];
+        EXPECT_EQ(point["hash"], all[i]["hash"]);
+        EXPECT_EQ(point["status"], all[i]["status"]);
+        if (all[i]["status"] == "failed") {
+            EXPECT_EQ(point["reason"], all[i]["reason"]);
+            continue;
+        }
+        EXPECT_EQ(point["picture_hash"], all[i]["picture_hash"]);
+        EXPECT_EQ(point["error"]["real"]["color"]["rmse"], all[i]["error"]["real"]["color"]["rmse_lsb8"]);
+        EXPECT_EQ(point["cost"]["bits"], all[i]["cost"]["bits"]);
+    }
+}
+
+TEST_F(ReportProgram, CommandsOfPointsRenderTheirPicturesAgain) {
+    const Json report = squint("report run --format json").json();
+    for (const Json& point : report["points"]) {
+        if (point["status"] != "done") continue;
+        const std::string command = point["command"];
+        ASSERT_TRUE(command.starts_with("squint render ")) << command;
+        const Outcome again = shell("\"$SQUINT\"" + command.substr(6) + " --json - -q");
+        ASSERT_EQ(again.code, 0) << again.err;
+        EXPECT_EQ(again.json()["pictures"][0]["hash"], point["picture_hash"]) << command;
+    }
+}
+
+TEST_F(ReportProgram, CsvHasALineAPointAndQuotesWhatHasCommas) {
+    const Outcome outcome = squint("report run --format csv");
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    std::istringstream lines(outcome.out);
+    std::vector<std::string> all;
+    for (std::string line; std::getline(lines, line);) all.push_back(line);
+    ASSERT_EQ(all.size(), 4u);
+    EXPECT_TRUE(all[0].starts_with("precision.sample,status,real color max,")) << all[0];
+    EXPECT_TRUE(all[1].starts_with("u12.4,done,")) << all[1];
+    EXPECT_TRUE(all[2].starts_with("u1.4,failed,")) << all[2];
+    for (const std::string& line : all) {  // the same number of fields in each, commas in quotes aside
+        bool quoted = false;
+        std::ptrdiff_t fields = 1;
+        for (const char c : line) quoted ^= c == '"', fields += c == ',' && !quoted;
+        EXPECT_EQ(fields, std::count(all[0].begin(), all[0].end(), ',') + 1) << line;
+    }
+}
+
+TEST_F(ReportProgram, MarkdownIsATableAndSaysWhatWasNotMeasured) {
+    const Outcome outcome = squint("report run --format markdown");
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    for (const char* part :
+         {"# Color, \"3\" ways | <b>\n", "| precision.sample | status |", "| u12.5 | done |",
+          "- Time: this sweep is not timed", "- 1 points failed", "squint sweep s.toml"})
+        EXPECT_NE(outcome.out.find(part), std::string::npos) << part << "\n" << outcome.out;
+}
+
+TEST_F(ReportProgram, ThePageIsOneFileThatAsksForNoOther) {
+    const Outcome outcome = squint("report run -o page.html");
+    if (outcome.code == 2 && outcome.err.find("no page") != std::string::npos) GTEST_SKIP() << outcome.err;
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    const std::string page = contents(folder / "page.html");
+    EXPECT_NE(page.find("<title>Color, &quot;3&quot; ways | &lt;b&gt;</title>"), std::string::npos);
+    EXPECT_NE(page.find("content=\"default-src 'none'; script-src 'sha256-"), std::string::npos);
+    for (const char* never :
+         {"unsafe", "<link", "<iframe", "<img", " src=\"", "@DATA@", "@PICTURES@", "@TITLE@"}) {
+        const std::size_t at = page.find(never);
+        // The libraries' own code may speak of such things; what is ours lies before and after it.
+        const std::size_t library = page.find("<script>"), ours = page.rfind("<script>");
+        EXPECT_TRUE(at == std::string::npos || (at > library && at < ours)) << never << " at " << at;
+    }
+}
+
+TEST_F(ReportProgram, RefusesAFolderThatIsNoRun) {
+    fs::create_directory(folder / "empty");
+    expect_refusal(squint("report empty --format csv"), "sweep.json");
+    expect_refusal(squint("report nowhere"), "nowhere");
+}
+
+}  // namespace
+}  // namespace squint::test
