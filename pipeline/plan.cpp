@@ -277,7 +277,12 @@ void plan_shading(Plan& plan) {
             fmt::format("shading.exponent: {} is not a power of two, which shading.power = \"squaring\" "
                         "needs; use {} or power = \"table\"",
                         settings.exponent, std::ldexp(1.0, s.squarings)));
-    s.parabola_slope = static_cast<std::int64_t>(settings.exponent + 1);
+    // (p + 1) / 2: a whole exponent needs one fraction bit; another gets what 31 bits leave, 20 more at most.
+    const int slope_bits = settings.exponent == std::floor(settings.exponent)
+                               ? 1
+                               : std::min(21, 32 - bits_for(settings.exponent + 2));
+    s.parabola_slope = static_cast<std::int64_t>(
+        std::floor(std::ldexp((settings.exponent + 1) / 2, slope_bits) + 0.5));
     s.power_table_bits = std::min(10, s.power_fraction);
     if (settings.power == PowerRule::table) {
         // 1024 rows, linear between them: error p^2 / 8 / 2^20 for exponent p.
@@ -298,7 +303,7 @@ void plan_shading(Plan& plan) {
     s.to_power_input = rescale(plan, s.dot_fraction, Wire::power);
     s.to_power = rescale(plan, 2 * s.power_fraction, Wire::power);
     s.to_power_lerp = rescale(plan, 2 * s.power_fraction - s.power_table_bits, Wire::power);
-    s.to_fall = rescale(plan, s.power_fraction + 1, Wire::power);
+    s.to_fall = rescale(plan, s.power_fraction + slope_bits, Wire::power);
     s.to_diffuse_sum = rescale(plan, s.dot_fraction + s.material_fraction, Wire::intensity);
     s.to_specular_sum = rescale(plan, s.power_fraction + s.material_fraction, Wire::intensity);
     s.to_diffuse = s.to_specular = rescale(plan, s.material_fraction + s.intensity_fraction, Wire::intensity);

@@ -1,6 +1,8 @@
 // Stage 5's hard cases: dot products at and beyond one, powers, lights that add up, and what stays dark.
 #include "pipeline/shading.h"
 
+#include "pipeline/plan.h"
+
 #include "core/portable_math.h"
 #include "fixedpoint/words.h"
 
@@ -182,6 +184,17 @@ TEST(Shading, TheParabolaIsItsFormula) {
     ShadingStage s = stage_of(0, 0, 1);
     set_power(s, PowerRule::parabola, 31, 15);  // 1 - 16 (1 - x)
     for (Word x = 0; x <= kOne; ++x) ASSERT_EQ(power(s, x), std::max<Word>(0, kOne - 16 * (kOne - x)));
+}
+
+// An exponent of 32.5 falls by 16.75 (1 - x): its half is not lost.
+TEST(Shading, TheParabolaKeepsTheFractionOfItsExponent) {
+    const Scene scene = scene_with(built_in_scene(), {"volume.procedural=sphere", "volume.dims=8",
+                                                      "shading.power=parabola", "shading.exponent=32.5"});
+    const Plan plan = make_plan(scene, std::make_shared<Volume>(load_volume(volume_source(scene))));
+    const Word one = Word{1} << plan.shading.power_fraction;
+    for (const Word below : {Word{1}, Word{64}, one / 64, one / 20})
+        EXPECT_EQ(power(plan.shading, one - below),
+                  one - quantise(67 * below, Rescale(2, {{20, 0, false}, Rounding::rnd_conv})));
 }
 
 // C5.5
