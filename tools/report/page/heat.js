@@ -12,7 +12,8 @@ function startHeat() {
 
 function ordered(values, axis) {
   const seen = [...new Set(values)];
-  return (seen.every((v) => typeof v === 'number') ? seen.sort((p, q) => p - q) : axis.order?.filter((v) => seen.includes(v)) ?? seen).map(valueText);
+  const numbers = seen.filter((v) => typeof v === 'number').sort((p, q) => p - q), words = seen.filter((v) => typeof v !== 'number');
+  return [...numbers, ...(axis.order?.filter((v) => words.includes(v)) ?? words)].map(valueText);
 }
 function heatMap() {
   if ($('heat').hidden) return;
@@ -29,7 +30,7 @@ function heatMap() {
   });
   const across = ordered(rows.map((r) => r.x), ax), down = ordered(rows.map((r) => r.y), ay), steep = across.some((t) => t.length > 0.13 * place.clientWidth / across.length);
   const x = { field: 'x', type: 'nominal', title: ax.name, sort: across, axis: { labelAngle: steep ? -40 : 0, labelLimit: 140, orient: 'bottom' } };
-  const y = { field: 'y', type: 'nominal', title: ay.name, sort: down, axis: { labelLimit: 150 } };
+  const y = { field: 'y', type: 'nominal', title: ay.name, sort: down, axis: { labelLimit: 0.25 * place.clientWidth, maxExtent: 400 } };
   const color = { field: 'error', type: 'quantitative', title: kFigures[state.figure], scale: { type: logarithmic() ? 'log' : 'linear', scheme: 'blues', reverse: moreIsBetter(), nice: false }, legend: { orient: 'top', gradientLength: 260, format: '~g', tickCount: 4, offset: 6 } };
   $('heat-hint').textContent = 'Medians over the other axes.' + (inLsb8() ? ' Bold: within half an LSB8.' : '');
   chart(place, `${kFigures[state.figure]} over ${ax.name} and ${ay.name}`, { height: down.length * Math.max(22, Math.min(34, 420 / down.length)), data: { values }, layer: [

@@ -70,6 +70,11 @@ function axisCurves() {
 
 // ---------------------------------------------------------------- one wire at a time
 
+// Of a wire, or of several varied as one; undefined where they are of different stages.
+function stageOf(wires) {
+  const stages = new Set(wires.split(' + ').map((wire) => kStages[kStageOf[wire]]));
+  return stages.size === 1 ? [...stages][0] : undefined;
+}
 // wire -> its points by number of bits, the base point among them.
 function wireSeries(kind, crossing) {
   const relative = kind.endsWith('offset'), part = kind.startsWith('fraction') ? 2 : 1;
@@ -102,7 +107,7 @@ function wireCurves() {
   if (!series.size) return $('first-format').replaceChildren(), nothing(place, 'No point has this figure.');
   const all = [...series.values()].flat(), floor = floorOf(all.map((r) => errorOf(r.p))), shown = (r) => lifted(errorOf(r.p), floor);
   const domain = [Math.min(...all.map(shown)), Math.max(...all.map(shown))], ends = [Math.min(...all.map((r) => r.at)), Math.max(...all.map((r) => r.at))];
-  const panels = grouped([...series], ([wire]) => kStages[kStageOf[wire]] ?? 'all wires together', ([wire, list]) => {
+  const panels = grouped([...series], ([wire]) => stageOf(wire) ?? 'all wires together', ([wire, list]) => {
     const first = inLsb8() ? firstWithin(list) : null;
     return list.map((r) => ({ wire, at: r.at, error: shown(r), hash: r.p.hash, base: r.base, first: r === first,
       tip: { wire, format: r.p.wires?.[wire] ?? '', [kFigures[state.figure]]: number(errorOf(r.p)), ...(r === first ? { '': 'the first within half an LSB8' } : {}) } }));
@@ -114,14 +119,14 @@ function wireCurves() {
     if (!panel) panel = element('div', { class: 'chart' }), panel.dataset.stage = stage, place.insertBefore(panel, place.children[i] ?? null);
     drawWhenNear(panel, () => wirePanel(panel, stage, panels.get(stage).flat(), domain, ends, relative ? `${part === 2 ? 'F' : 'I'} less the base's` : part === 2 ? 'fraction bits' : 'integer bits'));
   });
-  firstFormats(series, base);
+  firstFormats(series, base, (r) => `${part === 2 ? 'F' : 'I'}${relative ? (r.at < 0 ? '' : '+') : ' '}${r.at}`);
 }
 function wirePanel(panel, stage, values, domain, ends, title) {
   const y = { field: 'error', ...errorAxis(domain) };
   const x = { field: 'at', type: 'quantitative', title, scale: { domain: ends, nice: false, padding: 8 }, axis: { tickMinStep: 1, format: 'd' } };
-  const wires = kWires.filter((wire) => values.some((v) => v.wire === wire));
-  const scale = { domain: wires.length ? wires : [...new Set(values.map((v) => v.wire))], range: kPalette };
-  const color = { field: 'wire', type: 'nominal', title: null, scale, legend: { orient: 'bottom', columns: 3, labelLimit: 120, symbolType: 'stroke', symbolStrokeWidth: 3 } };
+  const wires = [...new Set(values.map((v) => v.wire))].sort((a, b) => kWires.indexOf(a.split(' + ')[0]) - kWires.indexOf(b.split(' + ')[0]));
+  const scale = { domain: wires, range: kPalette }, long = wires.some((wire) => wire.length > 18);
+  const color = { field: 'wire', type: 'nominal', title: null, scale, legend: { orient: 'bottom', columns: long ? 1 : 3, labelLimit: long ? panel.clientWidth - 60 : 120, symbolType: 'stroke', symbolStrokeWidth: 3 } };
   chart(panel, `${stage}: ${kFigures[state.figure]} across ${title}`, { title: stage, height: 200, data: { values }, layer: [
     ...halfLine(domain),
     { mark: { type: 'line', strokeWidth: 1.8 }, encoding: { x, y, color } },
@@ -131,12 +136,13 @@ function wirePanel(panel, stage, values, domain, ends, title) {
     ...halfName(domain),
   ] }, (view) => view.addEventListener('click', (event, item) => { if (item?.datum?.hash) choose(item.datum.hash); }));
 }
-function firstFormats(series, base) {
+// Of wires varied as one there is no one format to name: the number of bits is.
+function firstFormats(series, base, bitsOf) {
   const place = $('first-format');
   if (!inLsb8()) return place.replaceChildren();
-  const rows = [...series].filter(([wire]) => wire in kStageOf).map(([wire, list]) => {
+  const rows = [...series].filter(([wire]) => stageOf(wire)).map(([wire, list]) => {
     const first = firstWithin(list), least = list.reduce((m, r) => errorOf(r.p) < errorOf(m.p) ? r : m, list[0]);
-    return [wire, kStages[kStageOf[wire]], base?.wires?.[wire] ?? '', first ? first.p.wires?.[wire] : 'none measured', number(errorOf((first ?? least).p))];
+    return [wire, stageOf(wire), base?.wires?.[wire] ?? '', first ? first.p.wires?.[wire] ?? bitsOf(first) : 'none measured', number(errorOf((first ?? least).p))];
   });
   const cells = (tag, row) => row.map((cell, i) => element(tag, { class: i < 4 ? 'word' : '' }, cell));
   place.replaceChildren(element('table', {}, element('thead', {}, element('tr', {}, ...cells('th', ['wire', 'stage', 'at the base point', 'first format within half an LSB8', kFigures[state.figure] + ' there']))),
