@@ -34,7 +34,9 @@ void require_range(const WireSpecs& specs, Wire wire, double largest, const char
                         info(wire).name, to_string(f), f.integer_bits, what, largest, bits));
 }
 
-OpacityUnit build_opacity_unit(const WireSpecs& specs) {
+namespace {
+
+OpacityUnit computed_opacity_unit(const WireSpecs& specs) {
     const Spec depth = specs[Wire::slab_depth], alpha = specs[Wire::slab_alpha];
     OpacityUnit unit;
     unit.depth_fraction = depth.format.fraction_bits;
@@ -55,6 +57,23 @@ OpacityUnit build_opacity_unit(const WireSpecs& specs) {
     unit.to_alpha =
         Rescale(fraction + unit.depth_fraction - unit.row_bits, alpha, static_cast<int>(Wire::slab_alpha));
     return unit;
+}
+
+}  // namespace
+
+OpacityUnit build_opacity_unit(const WireSpecs& specs) {
+    // It knows nothing of the transfer function, and copies share their rows: the last few formats are kept.
+    struct Kept {
+        Spec depth, alpha;
+        OpacityUnit unit;
+    };
+    static thread_local std::vector<Kept> kept;
+    const Spec depth = specs[Wire::slab_depth], alpha = specs[Wire::slab_alpha];
+    for (const Kept& k : kept)
+        if (k.depth == depth && k.alpha == alpha) return k.unit;
+    if (kept.size() == 4) kept.erase(kept.begin());
+    kept.push_back({depth, alpha, computed_opacity_unit(specs)});
+    return kept.back().unit;
 }
 
 EntryLookup build_entry_lookup(const ClassificationInputs& in) {
