@@ -399,10 +399,15 @@ class Searcher {
                 for (const Spec& spec : base_) most.push_back(spec.format.integer_bits);
             return most;
         };
-        problem.most = most_of(true);
+        // The scene's own formats are the top where they leave room below the bound: wider ones are slower to
+        // render, and no wire of the result would want them.
+        const Lengths own = most_of(false);
+        const Step top{Phase::top, 0, -1};
+        const bool roomy = evaluate({&own, 1}, {&top, 1})[0].error <= s_.most_error / 2;
+        problem.most = most_of(!roomy);
         Found found = find_lengths(problem, s_.descent);
-        if (std::isinf(found.top.error)) {  // no word holds that many: from the scene's own, then
-            problem.most = most_of(false);
+        if (std::isinf(found.top.error)) {  // no word holds that many
+            problem.most = own;
             found = find_lengths(problem, s_.descent);
         }
         if (!top_.failure.empty()) throw InputError(top_.failure);
