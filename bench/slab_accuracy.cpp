@@ -80,15 +80,15 @@ std::vector<Function> functions(int size) {
     };
 }
 
-struct Slab {
+struct DrawnSlab {
     double front, back, length;
 };
 
 /// Ends on entries; lengths 1/4, 1/2, 1, 2 in turn.
-std::vector<Slab> drawn(int size, double reach, int count) {
+std::vector<DrawnSlab> drawn(int size, double reach, int count) {
     std::mt19937 generator(2);
     std::uniform_real_distribution<double> uniform(0, 1);
-    std::vector<Slab> slabs;
+    std::vector<DrawnSlab> slabs;
     while (static_cast<int>(slabs.size()) < count) {
         const double front = std::round(uniform(generator) * (size - 1));
         const double back = std::round(front + (2 * uniform(generator) - 1) * reach * size);
@@ -98,9 +98,9 @@ std::vector<Slab> drawn(int size, double reach, int count) {
     return slabs;
 }
 
-using Method = std::function<SlabValue(const Slab&)>;
+using SlabMethod = std::function<SlabValue(const DrawnSlab&)>;
 
-SlabValue without_self_attenuation(const PrefixTables& tables, const Slab& slab) {
+SlabValue without_self_attenuation(const PrefixTables& tables, const DrawnSlab& slab) {
     const Moments moments = tables.moments(slab.front, slab.back, slab.length, 1);
     SlabValue value{moments.q[0], -std::expm1(-moments.depth)};
     for (int k = 0; k < 3; ++k) value.color[k] = std::min(value.color[k], 1.0);
@@ -109,29 +109,29 @@ SlabValue without_self_attenuation(const PrefixTables& tables, const Slab& slab)
 
 /// A method whose tables are made for one length: one set for each of the four.
 template <class Build>
-Method for_each_length(const Build& build) {
+SlabMethod for_each_length(const Build& build) {
     using Tables = decltype(build(1.0));
     auto tables = std::make_shared<std::vector<Tables>>();
     for (int i = 0; i < 4; ++i) tables->push_back(build(0.25 * (1 << i)));
-    return [=](const Slab& slab) {
+    return [=](const DrawnSlab& slab) {
         const int which = slab.length < 0.4 ? 0 : slab.length < 0.8 ? 1 : slab.length < 1.5 ? 2 : 3;
         return (*tables)[which].slab(slab.front, slab.back, slab.length);
     };
 }
 
-std::vector<std::pair<std::string, Method>> methods(const Entries& entries) {
-    std::vector<std::pair<std::string, Method>> list;
+std::vector<std::pair<std::string, SlabMethod>> methods(const Entries& entries) {
+    std::vector<std::pair<std::string, SlabMethod>> list;
     const auto add = [&](const std::string& name, auto method) {
-        list.emplace_back(name, [=](const Slab& s) { return method.slab(s.front, s.back, s.length); });
+        list.emplace_back(name, [=](const DrawnSlab& s) { return method.slab(s.front, s.back, s.length); });
     };
-    add("PC", PostClassification{entries, Sample::front});
-    add("PC middle", PostClassification{entries, Sample::middle});
+    add("PC", preintegration::PostClassification{entries, Sample::front});
+    add("PC middle", preintegration::PostClassification{entries, Sample::middle});
     list.emplace_back("PI1D Kye",
                       for_each_length([&](double d) { return build_pi1d(entries, d, MeanOf::opacity_kye); }));
     list.emplace_back("PI1D Engel", for_each_length([&](double d) {
                           return build_pi1d(entries, d, MeanOf::clamped_extinction_engel);
                       }));
-    list.emplace_back("no self-attenuation", [tables = build_prefix_tables(entries, 1)](const Slab& s) {
+    list.emplace_back("no self-attenuation", [tables = build_prefix_tables(entries, 1)](const DrawnSlab& s) {
         return without_self_attenuation(tables, s);
     });
     for (const int order : {1, 2, 3, 4, 5})
@@ -147,9 +147,9 @@ std::vector<std::pair<std::string, Method>> methods(const Entries& entries) {
 
 /// The same in fixed point: tables and words of a preset, built for each of the four lengths.  What a method
 /// refuses is left out.
-std::vector<std::pair<std::string, Method>> methods_in_words(const Entries& entries,
-                                                             const std::string& preset) {
-    std::vector<std::pair<std::string, Method>> list;
+std::vector<std::pair<std::string, SlabMethod>> methods_in_words(const Entries& entries,
+                                                                 const std::string& preset) {
+    std::vector<std::pair<std::string, SlabMethod>> list;
     for (const cases::MethodCase& which : cases::all_methods()) {
         const bool table =
             which.method == squint::Method::pi2d || which.method == squint::Method::pi2d_no_attenuation;
@@ -158,10 +158,11 @@ std::vector<std::pair<std::string, Method>> methods_in_words(const Entries& entr
             auto built = std::make_shared<std::vector<cases::Classifier>>();
             for (const double step : {0.25, 0.5, 1.0, 2.0})
                 built->push_back(cases::make_classifier(entries, which, preset, size, step));
-            list.emplace_back(which.name() + (table ? " " + std::to_string(size) : ""), [=](const Slab& s) {
-                const int at = s.length < 0.4 ? 0 : s.length < 0.8 ? 1 : s.length < 1.5 ? 2 : 3;
-                return (*built)[static_cast<std::size_t>(at)].slab(s.front, s.back);
-            });
+            list.emplace_back(
+                which.name() + (table ? " " + std::to_string(size) : ""), [=](const DrawnSlab& s) {
+                    const int at = s.length < 0.4 ? 0 : s.length < 0.8 ? 1 : s.length < 1.5 ? 2 : 3;
+                    return (*built)[static_cast<std::size_t>(at)].slab(s.front, s.back);
+                });
         } catch (const InputError&) {
         }
     }
@@ -172,7 +173,8 @@ struct Error {
     double color_rms, color_max, alpha_rms, alpha_max;
 };
 
-Error measured(const Method& method, const std::vector<Slab>& slabs, const std::vector<SlabValue>& truth) {
+Error measured(const SlabMethod& method, const std::vector<DrawnSlab>& slabs,
+               const std::vector<SlabValue>& truth) {
     Error error{};
     for (std::size_t i = 0; i < slabs.size(); ++i) {
         const SlabValue value = method(slabs[i]);
@@ -268,7 +270,7 @@ int main(int argc, char** argv) {
             int count;
         };
         const auto list = functions(size);
-        std::vector<std::vector<std::pair<std::string, Method>>> built;
+        std::vector<std::vector<std::pair<std::string, SlabMethod>>> built;
         for (const auto& function : list)
             built.push_back(preset.empty() ? methods(function.entries)
                                            : methods_in_words(function.entries, preset));
@@ -277,10 +279,10 @@ int main(int argc, char** argv) {
                                          bits == 8    ? 1000
                                          : bits == 12 ? 200
                                                       : 40}}) {
-            const std::vector<Slab> slabs = drawn(size, reach.of_range, reach.count);
+            const std::vector<DrawnSlab> slabs = drawn(size, reach.of_range, reach.count);
             for (std::size_t f = 0; f < list.size(); ++f) {
                 std::vector<SlabValue> truth;
-                for (const Slab& s : slabs)
+                for (const DrawnSlab& s : slabs)
                     truth.push_back(exact_slab(list[f].entries, s.front, s.back, s.length));
                 for (const auto& [name, method] : built[f])
                     rows.push_back({bits, reach.name, list[f].name, name, measured(method, slabs, truth)});

@@ -24,10 +24,9 @@ int sub_entry_bits_for_color(const ClassificationInputs& in, int most_rows) {
         const Vec3 step = b.color - a.color;
         const double swing = std::max({std::abs(step.x), std::abs(step.y), std::abs(step.z)});
         // The mean weighted by extinction is at most two thirds of the swing away from either end.
-        if (swing > 0)
-            worst =
-                std::max(worst, swing * 2 / 3 *
-                                    -portable::expm1(-std::max(a.extinction, b.extinction) * in.step_world));
+        const double depth = std::max(a.extinction, b.extinction) * in.step_world;
+        if (swing * 2 / 3 * std::min(depth, 1.0) > worst)  // more than the opacity can make of it
+            worst = std::max(worst, swing * 2 / 3 * -portable::expm1(-depth));
     }
     int bits = 0;
     while (std::ldexp(worst, -bits) > kInsideEntry && bits < in.input_fraction &&
