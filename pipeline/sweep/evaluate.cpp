@@ -250,7 +250,12 @@ WireSpecs Evaluator::preset_specs_of(const Scene& scene, const std::shared_ptr<c
 }
 
 WireSpecs Evaluator::specs_of(const Scene& scene, const std::shared_ptr<const Volume>& volume) {
-    WireSpecs specs = preset_specs_of(scene, volume);
+    WireSpecs specs;
+    try {
+        specs = preset_specs_of(scene, volume);
+    } catch (const InputError&) {  // the preset alone does not fit; with the scene's own wires it may
+        return make_plan(scene, volume).specs;
+    }
     for (int w = 0; w < kWires; ++w)
         if (const auto& text = scene.precision.override_[static_cast<std::size_t>(w)])
             if (const std::string bad = parse_spec(*text, specs[static_cast<Wire>(w)]); !bad.empty())

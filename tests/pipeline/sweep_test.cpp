@@ -161,6 +161,17 @@ TEST(SweepPoint, KeepsWhyItCannotBeRendered) {
     EXPECT_NE(points[1].hash, "");
 }
 
+// Squeeze's V has one integer bit: at a step of 4 voxels the preset alone is refused.
+TEST(SweepPoint, MendsAPresetThatDoesNotFit) {
+    const SweepFile sweep = parsed(kTiny +
+                                   "precision.preset = 'squeeze'\nsampling.step = 4\n[[axis]]\n"
+                                   "key = 'precision.direction'\nvalues = ['s1.12', 's3.12']\n");
+    Evaluator evaluator(sweep, "");
+    const std::vector<Point> points = expand(sweep, {});
+    EXPECT_THAT(evaluator.prepare(points[0]).failure, HasSubstr("precision.direction"));
+    EXPECT_EQ(evaluator.prepare(points[1]).failure, "");
+}
+
 TEST(SweepPoint, MeasuresNoErrorWhereNothingIsRounded) {
     const SweepFile sweep = parsed(kTiny + "precision.preset = 'real'\n");
     Evaluator evaluator(sweep, "");
