@@ -1,6 +1,6 @@
 // What the tests of the page share: a browser, runs of sweeps, and readers of what stands on the page.
 import { execFileSync } from 'node:child_process';
-import { existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, writeFileSync, copyFileSync } from 'node:fs';
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync, copyFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
@@ -14,6 +14,7 @@ export const program = process.argv[2];
 export const folder = mkdtempSync(join(tmpdir(), 'squint-report-'));
 
 function skip(why) {
+  rmSync(folder, { recursive: true });
   console.log(`Skipped: ${why}`);
   process.exit(kSkipped);
 }
