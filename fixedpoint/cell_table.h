@@ -105,4 +105,10 @@ inline std::array<Range, 4> gather_cell(const CellTable& t, Range, Range) {
     return {any, any, any, any};
 }
 
+/// Cells (row, column) and (row, column + 1).
+template <class W>
+std::array<std::array<W, 4>, 2> gather_two_cells(const CellTable& t, W row, W column) {
+    return {gather_cell(t, row, column), gather_cell(t, row, column + constant<W>(1))};
+}
+
 }  // namespace squint

@@ -51,6 +51,19 @@ struct Rescale {
     }
 };
 
+/// What is known of all the Rescales a kernel meets when it is compiled; what holds for one holds for those
+/// before it.
+enum class KnownRescales {
+    nothing,
+    halves_to_even,  // bits are dropped, at most; floor, halves up or to even; limits saturate
+    halves_up,       // as above without halves to even, and without limits
+};
+inline bool holds(KnownRescales known, const Rescale& to, int lane_bits) {
+    if (to.width == 0 || known == KnownRescales::nothing) return true;  // a wire nothing flows through
+    if (to.shift < 0 || to.shift >= lane_bits || to.to_zero != 0) return false;
+    return known == KnownRescales::halves_up ? to.to_even == 0 && !to.limits : !(to.limits && to.wraps);
+}
+
 template <class W>
 concept Integer = std::same_as<W, std::int64_t> || std::same_as<W, Int128>;
 
@@ -80,6 +93,24 @@ template <Integer W>
 /// just below a half cannot happen.  NaN gives 0; infinities and everything too large obey the overflow
 /// rule's saturation.
 std::int64_t quantise_real(double x, const Spec& spec);
+/// The same for many: `one` is 2^F, `to` built with F fraction bits and the Spec.
+inline std::int64_t quantise_real(double x, double one, const Rescale& to) {
+    // Scaling by a power of two is exact, and so are the whole part of a double and what lies above it: no
+    // sum can round up just below a half.
+    const double scaled = x * one;
+    if (!(scaled > -0x1p62 && scaled < 0x1p62)) return x < 0 ? to.lowest : x > 0 ? to.highest : 0;
+    // Tables and rays are made of these.  Adding 1.5 2^52 leaves no fraction bits: the sum is the nearest
+    // integer, halves to even.
+    if (to.rounding == Rounding::rnd_conv && scaled > -0x1p51 && scaled < 0x1p51)
+        return limit(static_cast<std::int64_t>((scaled + 0x1.8p52) - 0x1.8p52), to);
+    auto raw = static_cast<std::int64_t>(scaled);
+    raw -= static_cast<double>(raw) > scaled;  // the floor
+    const double rest = scaled - static_cast<double>(raw);
+    if (to.rounding == Rounding::rnd) raw += rest >= 0.5;
+    if (to.rounding == Rounding::rnd_conv) raw += rest > 0.5 || (rest == 0.5 && (raw & 1));
+    if (to.rounding == Rounding::trn_zero) raw += rest > 0 && raw < 0;
+    return limit(raw, to);
+}
 
 /// The value of a raw number.
 constexpr double to_real(std::int64_t raw, const Format& format) {

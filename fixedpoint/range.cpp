@@ -108,11 +108,18 @@ Range shift_by(Range x, Range bits) {
         return by >= 0 ? product(value, Int128{1} << std::min<Int128>(by, 120))
                        : value >> std::min<Int128>(-by, 120);
     };
-    return noted(
-        spanning({at(x.low, bits.low), at(x.low, bits.high), at(x.high, bits.low), at(x.high, bits.high)}));
+    // Its callers know the result to be smaller, and say so with within().
+    const Range all =
+        spanning({at(x.low, bits.low), at(x.low, bits.high), at(x.high, bits.low), at(x.high, bits.high)});
+    noted_in_passing(all.low, all.high);
+    return {cap(all.low), cap(all.high)};
 }
-Range square_root(Range x) {
-    return {0, static_cast<Int128>(std::sqrt(static_cast<double>(x.high))) + 1};
+Range vector_length(const std::array<Range, 3>& v, int guard) {
+    Int128 squares = 0;
+    for (const Range& x : v) note_operands(x, x), squares += product(x.high, x.high);
+    squares <<= 2 * guard;
+    noted_in_passing(0, squares);
+    return noted({0, static_cast<Int128>(std::sqrt(static_cast<double>(squares))) + 1});
 }
 Range quantise(Range x, const Rescale& to) {
     Range rounded = x;

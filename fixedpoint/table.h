@@ -36,17 +36,20 @@ class Table {
     const std::int32_t* narrow() const {
         return data_ && !data_->narrow.empty() ? data_->narrow.data() : nullptr;
     }
-    /// Two neighbouring columns of unsigned 16-bit words as one of 32 bits, the even column low: half the
-    /// loads for lanes. Null where a word does not fit.  Made by pack(), once the table is built.
-    const std::int32_t* packed() const {
-        return data_ && !data_->packed.empty() ? data_->packed.data() : nullptr;
+    /// Of a table of four columns of unsigned 16-bit words: word c of row i in the low half, the same of row i + 1 in
+    /// the high half, at i * 4 + c.  One load for lanes that blend two rows.  Null where a word does not fit.  Made
+    /// by pair_rows(), once the table is built.
+    const std::int32_t* paired() const {
+        return data_ && !data_->paired.empty() ? data_->paired.data() : nullptr;
     }
-    void pack() {
-        data_->packed.clear();
-        for (std::size_t i = 0; i + 1 < data_->words.size(); i += 2) {
-            const std::int64_t low = data_->words[i], high = data_->words[i + 1];
-            if (columns_ % 2 || (low | high) >> 16) return data_->packed.clear();
-            data_->packed.push_back(static_cast<std::int32_t>(static_cast<std::uint32_t>(low | high << 16)));
+    void pair_rows() {
+        data_->paired.clear();
+        if (columns_ != 4) return;
+        for (std::size_t i = 0; i < data_->words.size(); ++i) {
+            const std::int64_t here = data_->words[i],
+                               next = i + 4 < data_->words.size() ? data_->words[i + 4] : here;
+            if ((here | next) >> 16) return data_->paired.clear();
+            data_->paired.push_back(static_cast<std::int32_t>(static_cast<std::uint32_t>(here | next << 16)));
         }
     }
     const std::vector<std::int64_t>& words() const { return data_->words; }
@@ -70,7 +73,7 @@ class Table {
         std::vector<double> exact;
         std::vector<std::int64_t> words;
         std::vector<std::int32_t> narrow;
-        std::vector<std::int32_t> packed;
+        std::vector<std::int32_t> paired;
     };
     void put(std::size_t at, double exact_raw, std::int64_t raw) {
         data_->exact[at] = exact_raw, data_->words[at] = raw;

@@ -2,7 +2,7 @@
 // here:
 //
 //   + - *   shift_left  floor_shift  min max absolute  == <  select  any  constant<W>  gather  bit_length
-//   square_root quantise  quotient  blend  affine  within
+//   vector_length quantise  quotient  blend  affine  within
 //
 // Integer<W>   the model: 64 bits, or 128 where a product needs them
 // Audited      the model, counting what every wire carried
@@ -107,12 +107,13 @@ template <Integer W>
 constexpr W shift_by(W x, W bits) {
     return bits >= 0 ? shift_left(x, static_cast<int>(bits)) : floor_shift(x, static_cast<int>(-bits));
 }
-/// floor(sqrt(x)) for 0 <= x < 2^52.
+/// floor(|v| 2^guard) of a vector whose components are at least 0 and below 2^15; guard <= 10.
 template <Integer W>
-W square_root(W x) {
+W vector_length(const std::array<W, 3>& v, int guard) {
     // The double nearest to the root of an integer below 2^52 has the right floor: the root of a non-square
     // is at least 2^-27 away from an integer, far more than half a unit in a double's last place there.
-    return static_cast<std::int64_t>(std::sqrt(static_cast<double>(static_cast<std::int64_t>(x))));
+    const W squares = shift_left(v[0] * v[0] + v[1] * v[1] + v[2] * v[2], 2 * guard);
+    return static_cast<std::int64_t>(std::sqrt(static_cast<double>(static_cast<std::int64_t>(squares))));
 }
 
 /// numerator / denominator, exact, then quantised once.  numerator >= 0, denominator > 0.  `to` is built with
@@ -187,8 +188,8 @@ constexpr Audited bit_length(Audited x) {
 constexpr Audited shift_by(Audited x, Audited bits) {
     return {shift_by(x.v, bits.v)};
 }
-inline Audited square_root(Audited x) {
-    return {square_root(x.v)};
+inline Audited vector_length(const std::array<Audited, 3>& v, int guard) {
+    return {vector_length(std::array<Int128, 3>{v[0].v, v[1].v, v[2].v}, guard)};
 }
 
 inline Audited record(Int128 rounded, bool inexact, double exact, const Rescale& to) {
@@ -386,14 +387,18 @@ Range affine(Range p, Range k, Range v, std::int64_t low, std::int64_t high);
 Range within(Range x, std::int64_t low, std::int64_t high);
 Range bit_length(Range x);
 Range shift_by(Range x, Range bits);
-Range square_root(Range x);
+Range vector_length(const std::array<Range, 3>& v, int guard);
 Range quantise(Range x, const Rescale& to);
 Range quotient(Range numerator, Range denominator, const Rescale& to);
 
-/// Columns `column` and `column + 1` of a row; `column` is even.
+/// Rows `row` and `row + 1` of a table of four columns, blended.
 template <class W>
-std::array<W, 2> gather_pair(const Table& table, W row, int column) {
-    return {gather(table, row, column), gather(table, row, column + 1)};
+std::array<W, 4> blend_rows(const Table& table, W row, W weight, int weight_bits) {
+    std::array<W, 4> between;
+    for (int c = 0; c < 4; ++c)
+        between[static_cast<std::size_t>(c)] =
+            blend(gather(table, row, c), gather(table, row + constant<W>(1), c), weight, weight_bits);
+    return between;
 }
 
 template <class W>

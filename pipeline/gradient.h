@@ -153,12 +153,8 @@ HWY_INLINE std::array<W, 3> normalise(const GradientStage& s, const std::array<W
     const W largest = max(max(size[0], size[1]), size[2]);
     const auto nothing = largest == zero;
     const W shift = constant<W>(kNormalBits) - bit_length(largest);
-    W squares = zero;
-    for (std::size_t a = 0; a < 3; ++a) {
-        size[a] = within(shift_by(size[a], shift), 0, std::int64_t{1} << kNormalBits);
-        squares = squares + size[a] * size[a];
-    }
-    const W length = max(square_root(shift_left(squares, 2 * kNormalGuard)), constant<W>(1));
+    for (W& part : size) part = within(shift_by(part, shift), 0, (std::int64_t{1} << kNormalBits) - 1);
+    const W length = max(vector_length(size, kNormalGuard), constant<W>(1));
     for (std::size_t a = 0; a < 3; ++a) {
         const W part = quotient(size[a], length, s.to_normal);
         normal[a] = select(nothing, zero, select(gradient[a] < zero, part, zero - part));

@@ -25,6 +25,9 @@ struct InterpolationStage {
 template <class W>
 struct Cell {
     std::array<W, 8> corner;
+    W at(int i) const { return corner[static_cast<std::size_t>(i)]; }
+    /// Corners 2 i and 2 i + 1 blended, exact.
+    W along_x(int i, W weight, int weight_bits) const { return blend(at(2 * i), at(2 * i + 1), weight, weight_bits); }
 };
 
 }  // namespace squint
@@ -47,25 +50,24 @@ HWY_INLINE W lerp(W v0, W v1, W weight, int weight_bits, const Rescale& to) {
     return quantise(blend(v0, v1, weight, weight_bits), to);
 }
 
-/// Seven lerps: four along x, two along y, one along z.  Each level has a format of its own.
-template <class W>
-HWY_INLINE W interpolate(const InterpolationStage& s, const Cell<W>& cell, const std::array<W, 3>& weight) {
-    const auto& c = cell.corner;
+/// Seven lerps: four along x, two along y, one along z.  Each level has a format of its own.  C: a Cell, however its
+/// corners are kept.
+template <class W, class C>
+HWY_INLINE W interpolate(const InterpolationStage& s, const C& cell, const std::array<W, 3>& weight) {
     if (s.nearest) {
         const W half = constant<W>(std::int64_t{1} << (s.weight_bits - 1));
         const auto pick = [&](W near, W far, std::size_t axis) {
             return select(weight[axis] < half, near, far);
         };
-        const W y0 = pick(pick(c[0], c[1], 0), pick(c[2], c[3], 0), 1);
-        const W y1 = pick(pick(c[4], c[5], 0), pick(c[6], c[7], 0), 1);
+        const W y0 = pick(pick(cell.at(0), cell.at(1), 0), pick(cell.at(2), cell.at(3), 0), 1);
+        const W y1 = pick(pick(cell.at(4), cell.at(5), 0), pick(cell.at(6), cell.at(7), 0), 1);
         return shift_left(pick(y0, y1, 2), s.sample_fraction);
     }
-    const W y0z0 = lerp(c[0], c[1], weight[0], s.weight_bits, s.to_x);
-    const W y1z0 = lerp(c[2], c[3], weight[0], s.weight_bits, s.to_x);
-    const W y0z1 = lerp(c[4], c[5], weight[0], s.weight_bits, s.to_x);
-    const W y1z1 = lerp(c[6], c[7], weight[0], s.weight_bits, s.to_x);
-    const W z0 = lerp(y0z0, y1z0, weight[1], s.weight_bits, s.to_y);
-    const W z1 = lerp(y0z1, y1z1, weight[1], s.weight_bits, s.to_y);
+    std::array<W, 4> x;  // y fastest
+    for (int i = 0; i < 4; ++i)
+        x[static_cast<std::size_t>(i)] = quantise(cell.along_x(i, weight[0], s.weight_bits), s.to_x);
+    const W z0 = lerp(x[0], x[1], weight[1], s.weight_bits, s.to_y);
+    const W z1 = lerp(x[2], x[3], weight[1], s.weight_bits, s.to_y);
     return lerp(z0, z1, weight[2], s.weight_bits, s.to_sample);
 }
 

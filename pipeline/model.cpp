@@ -77,7 +77,7 @@ void cast_tile(const Plan& plan, int left, int top, int right, int bottom, Image
                 const Pixel<W> pixel = cast_ray<W>(plan, method, ray);
                 store(plan, pixel, column, row, image);
                 statistics.rays += ray.slabs > 0;
-                statistics.samples += pixel.samples;
+                statistics.samples += pixel.samples, statistics.visited += pixel.samples;
             }
     });
 }

@@ -23,13 +23,13 @@ int wire_index(Wire w) {
 
 // ------------------------------------------------------------------------------------------------ rays
 
-Vec3 box_low(const Plan& plan) {
+Vec3 clipped_low(const Plan& plan) {
     Vec3 low = plan.volume->origin;
     if (const auto& clip = plan.scene.clip.low)
         for (int a = 0; a < 3; ++a) low[a] = std::max(low[a], (*clip)[a]);
     return low;
 }
-Vec3 box_high(const Plan& plan) {
+Vec3 clipped_high(const Plan& plan) {
     Vec3 high = plan.volume->world_from_voxel(
         Vec3(plan.volume->dims.x - 1.0, plan.volume->dims.y - 1.0, plan.volume->dims.z - 1.0));
     if (const auto& clip = plan.scene.clip.high)
@@ -39,7 +39,7 @@ Vec3 box_high(const Plan& plan) {
 
 // The longest chord a ray can have, in steps.
 double most_steps(const Plan& plan) {
-    const Vec3 diagonal = box_high(plan) - box_low(plan);
+    const Vec3 diagonal = plan.box_high - plan.box_low;
     return std::max(1.0, std::sqrt(diagonal.dot(diagonal)) / plan.step_world);
 }
 
@@ -389,6 +389,26 @@ struct LeaveOutLimits {
     void operator()(CellTable&) const {}
 };
 
+// Limits that meanings rule out where ranges cannot.
+void leave_out_proven_limits(Plan& plan, const Slab<Range>& slab) {
+    // A location is clamped to the box, and its format holds the box.
+    if (!plan.location.to_location.wraps) plan.location.to_location.limits = false;
+    // Form w: w = q(alpha T) <= T for alpha <= 1, so T never falls below 0.  c w rounds to w at most for c <= 1, so
+    // C, a sum of such shares, never passes the sum of all w, which is 1 - T.  (Lit colours may pass 1.)
+    CompositingStage& s = plan.compositing;
+    const Format& color = plan.specs[Wire::color].format;
+    const auto within_unit = [](const Range& x, int fraction) {
+        return x.low >= 0 && x.high <= std::int64_t{1} << fraction;
+    };
+    const bool unit_slab = within_unit(slab.alpha, s.alpha_fraction) &&
+                           std::all_of(slab.color.begin(), slab.color.end(),
+                                       [&](const Range& c) { return within_unit(c, s.color_fraction); });
+    if (s.form == CompositingForm::w && !s.premultiplied && unit_slab &&
+        s.contribution_fraction == s.transparency_fraction && color.integer_bits >= 1 &&
+        color.fraction_bits == s.contribution_fraction)
+        s.to_color_sum.limits = s.to_transparency.limits = false;
+}
+
 void choose_words(Plan& plan) {
     const Volume& v = *plan.volume;
     const Range voxel{v.smallest, v.largest};
@@ -464,6 +484,8 @@ void choose_words(Plan& plan) {
     }
     plan.word_bits = all.result_bits <= 63 ? 64 : 128;
     visit_stages(plan, LeaveOutLimits{Range::limited});
+    leave_out_proven_limits(plan, slab);
+
 }
 
 void report_stages(Plan& plan) {
@@ -485,7 +507,7 @@ RaySetup Plan::set_up(int column, int row) const {
     RaySetup setup;
     const Ray ray = camera.ray(column, row);
     setup.direction = ray.direction;
-    const Interval inside = intersect(ray, box_low(*this), box_high(*this));
+    const Interval inside = intersect(ray, box_low, box_high);
     if (inside.empty()) return setup;
     const double steps = (inside.last - inside.first) / step_world;
     // A chord of n steps is n slabs: 2^-30 steps forgive the rounding of the chord itself.
@@ -515,6 +537,7 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
     plan.camera = make_camera(scene.camera, v, scene.image.width, scene.image.height, frame);
     plan.entries = sample_entries(resolve_transfer_function(scene), v);
     plan.step_world = scene.sampling.step * v.smallest_spacing();
+    plan.box_low = clipped_low(plan), plan.box_high = clipped_high(plan);
     if (most_steps(plan) > 16e6)
         throw InputError(
             fmt::format("sampling.step: {} makes rays of {:.0f} samples, and 16000000 are allowed",

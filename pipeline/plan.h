@@ -42,6 +42,7 @@ struct Plan {
     WireSpecs specs;
     bool real = false;      // preset `real`: doubles, nothing quantised
     double step_world = 1;  // length of a full slab
+    Vec3 box_low{0, 0, 0}, box_high{0, 0, 0};  // what of the volume is rendered, world
 
     LocationStage location;
     InterpolationStage interpolation;

@@ -42,8 +42,8 @@ namespace squint::HWY_NAMESPACE {
 
 /// A set-up value to a word: rounded by its wire, or (Real, inactive) exact.
 template <class W>
-W word_from(double value, const Spec& spec, const Rescale&) {
-    return constant<W>(quantise_real(value, spec));
+W word_from(double value, const Spec& spec, const Rescale& to) {
+    return constant<W>(quantise_real(value, static_cast<double>(spec.format.one()), to));
 }
 template <class W>
 requires requires {

@@ -65,7 +65,7 @@ Rendering render(const Plan& plan, const RenderOptions& options) {
     statistics.path = fast ? "lanes" : "model";
     statistics.target = fast ? fast->target() : "";
     statistics.why = fast ? fast->why() : model.why() + (obstacle && !plan.real ? ": " + *obstacle : "");
-    statistics.bytes = fast ? fast->bytes() : 0;
+    statistics.layout = fast ? fast->layout() : "linear";
     statistics.setup_seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - setup_start).count();
 
@@ -92,8 +92,9 @@ Rendering render(const Plan& plan, const RenderOptions& options) {
     });
     if (stopped) throw Cancelled{};
     statistics.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    statistics.bytes = fast ? fast->bytes() : 0;
     for (const TileStatistics& t : per_tile) {
-        statistics.rays += t.rays, statistics.samples += t.samples;
+        statistics.rays += t.rays, statistics.samples += t.samples, statistics.visited += t.visited;
         if (t.wires)
             for (std::size_t w = 0; w < t.wires->size(); ++w) statistics.wires[w].merge((*t.wires)[w]);
     }

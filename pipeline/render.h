@@ -20,6 +20,7 @@ struct RenderOptions {
     Path path = Path::automatic;
     std::string target;  // SIMD target by name ("AVX3", "AVX2", "SSE4", "EMU128"); empty: the best there is
     LayoutRule layout = LayoutRule::automatic;
+    std::int64_t layout_bytes = std::int64_t{4} << 30;  // room for a layout beside the volume itself
     bool skip = true;                      // leave out empty space
     bool audit = false;                    // count what every wire carried; runs the audited model
     bool as_float = false;                 // lanes of float32: the honest comparison, never the same bits
@@ -31,6 +32,7 @@ struct RenderStatistics {
     std::string path, target, why, layout;  // what ran, and why
     int threads = 1;
     std::int64_t rays = 0, samples = 0;  // rays that met the volume; slabs composited
+    std::int64_t visited = 0;            // slabs that went through the stages, and were not left out as empty
     double seconds = 0;                  // ray casting alone
     double setup_seconds = 0;  // layouts and block structures, where they were built for this picture
     std::int64_t bytes = 0;    // volume layouts, tables and buffers

@@ -106,7 +106,7 @@ EntryLookup build_entry_lookup(const ClassificationInputs& in) {
             i, EntryLookup::opaque,
             entry.opaque ? EntryLookup::entry_is + (next ? EntryLookup::segment_is : 0) : 0);
     }
-    lookup.table.pack();
+    lookup.table.pair_rows();
     const Spec slab_alpha = specs[Wire::slab_alpha];
     // A straight colour leaves on the wire slab_ratio, an opacity on slab_alpha.
     lookup.to_color = Rescale(color.format.fraction_bits + in.input_fraction, specs[Wire::slab_ratio],

@@ -170,16 +170,6 @@ HWY_INLINE EntryPosition<W> entry_position(const EntryLookup& e, W input) {
                        constant<W>(std::int64_t{1} << e.input_fraction))};
 }
 
-/// Two columns of a table at a position, exact: raw with input_fraction bits more.
-template <class W>
-HWY_INLINE std::array<W, 2> entry_blend(const EntryLookup& e, const Table& table, const EntryPosition<W>& at,
-                                        int column) {
-    const std::array<W, 2> low = gather_pair(table, at.entry, column),
-                           high = gather_pair(table, at.entry + constant<W>(1), column);
-    return {blend(low[0], high[0], at.fraction, e.input_fraction),
-            blend(low[1], high[1], at.fraction, e.input_fraction)};
-}
-
 /// One where a position is opaque: on an opaque entry, or between two (CONVENTIONS.md).
 template <class W>
 HWY_INLINE auto is_opaque(const EntryLookup& e, const EntryPosition<W>& at) {
@@ -199,14 +189,15 @@ HWY_INLINE Slab<W> classify_point(const EntryLookup& e, W input, W length) {
     const EntryPosition<W> at = entry_position(e, input);
     const W full = constant<W>(std::int64_t{1} << e.length_fraction);
     Slab<W> slab;
-    const std::array<W, 2> red_green = entry_blend(e, e.table, at, EntryLookup::red);
-    const std::array<W, 2> blue_alpha = entry_blend(e, e.table, at, EntryLookup::blue);
-    slab.color = {quantise(red_green[0], e.to_color), quantise(red_green[1], e.to_color),
-                  quantise(blue_alpha[0], e.to_color)};
-    slab.alpha = quantise(blue_alpha[1], e.to_alpha);
+    const std::array<W, 4> between = blend_rows(e.table, at.entry, at.fraction, e.input_fraction);
+    for (std::size_t c = 0; c < 3; ++c) slab.color[c] = quantise(between[c], e.to_color);
+    slab.alpha = quantise(between[EntryLookup::alpha], e.to_alpha);
     const auto shorter = length < full;
     if (any(shorter)) {
-        const W full_depth = quantise(entry_blend(e, e.matter, at, EntryLookup::extinction)[0], e.to_depth);
+        const W next = gather(e.matter, at.entry + constant<W>(1), EntryLookup::extinction);
+        const W full_depth = quantise(
+            blend(gather(e.matter, at.entry, EntryLookup::extinction), next, at.fraction, e.input_fraction),
+            e.to_depth);
         const W depth = quantise(full_depth * length, e.to_shorter);
         slab.alpha = select(shorter, opacity_of_depth(e.opacity, depth), slab.alpha);
     }

@@ -68,15 +68,15 @@ HWY_INLINE EntryPosition<W> node_position(const PreIntegrated2D& m, W input) {
 template <class W>
 HWY_INLINE Slab<W> look_up(const PreIntegrated2D& m, W front, W back) {
     const EntryPosition<W> f = node_position(m, front), b = node_position(m, back);
-    std::array<W, 4> cell = gather_cell(m.cells, f.entry, b.entry);
-    if (!m.nearest) {
-        const W next_row = f.entry + constant<W>(1), next_column = b.entry + constant<W>(1);
-        const std::array<W, 4> right = gather_cell(m.cells, f.entry, next_column);
-        const std::array<W, 4> below = gather_cell(m.cells, next_row, b.entry);
-        const std::array<W, 4> across = gather_cell(m.cells, next_row, next_column);
+    std::array<W, 4> cell;
+    if (m.nearest) {
+        cell = gather_cell(m.cells, f.entry, b.entry);
+    } else {
+        const auto [left, right] = gather_two_cells(m.cells, f.entry, b.entry);
+        const auto [below, across] = gather_two_cells(m.cells, f.entry + constant<W>(1), b.entry);
         for (std::size_t c = 0; c < 4; ++c) {
             const Rescale& to = c < 3 ? m.to_color : m.to_alpha;
-            const W here = quantise(blend(cell[c], right[c], b.fraction, m.node_fraction), to);
+            const W here = quantise(blend(left[c], right[c], b.fraction, m.node_fraction), to);
             const W next = quantise(blend(below[c], across[c], b.fraction, m.node_fraction), to);
             cell[c] = quantise(blend(here, next, f.fraction, m.node_fraction), to);
         }

@@ -1,13 +1,13 @@
 #include "pipeline/lanes/empty_space.h"
 
+#include "pipeline/lanes/kept.h"
+
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <map>
-#include <mutex>
 
 namespace squint::lanes {
 namespace {
@@ -68,15 +68,8 @@ void spread(std::vector<std::uint8_t>& distance, const Index3& blocks) {
 
 }  // namespace
 
-std::shared_ptr<const BlockRanges> block_ranges(const Volume& volume) {
-    // Kept while the volume's voxels live.
-    static std::mutex mutex;
-    static std::map<const void*, std::pair<std::weak_ptr<const void>, std::shared_ptr<const BlockRanges>>>
-        kept;
-    const std::lock_guard lock(mutex);
-    std::erase_if(kept, [](const auto& item) { return item.second.first.expired(); });
-    if (const auto found = kept.find(volume.data.get()); found != kept.end()) return found->second.second;
-
+namespace {
+std::shared_ptr<BlockRanges> measure(const Volume& volume) {
     auto ranges = std::make_shared<BlockRanges>();
     const auto cells = [](std::int64_t n) {
         return std::max<std::int64_t>((n - 1 + kBlock - 1) / kBlock, 1);
@@ -90,8 +83,14 @@ std::shared_ptr<const BlockRanges> block_ranges(const Volume& volume) {
         else
             measure_slab<std::uint16_t>(volume, *ranges, bz);
     });
-    kept[volume.data.get()] = {volume.data, ranges};
     return ranges;
+}
+}  // namespace
+
+std::shared_ptr<const BlockRanges> block_ranges(const Volume& volume) {
+    static KeptPerVolume<BlockRanges> kept;
+    return kept.find(
+        volume, [&] { return measure(volume); }, [](const BlockRanges&) { return true; });
 }
 
 EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, bool between_samples,

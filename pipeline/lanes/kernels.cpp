@@ -41,12 +41,14 @@ std::int64_t find_target(const std::string& name) {
                                  fmt::join(target_names(), ", ")));
 }
 
-StageKernels kernels_for(const Plan& plan, const StageWidths& widths, std::int64_t target) {
+StageKernels kernels_for(const Plan& plan, const StageWays& ways, const VoxelSource& source,
+                         std::int64_t target) {
     StageKernels kernels;
-    sampling_kernels(target, widths, kernels);
-    classification_kernel(target, plan, widths, kernels);
-    shading_kernel(target, kernels);
-    compositing_kernel(target, widths, kernels);
+    sampling_kernels(target, ways, kernels);
+    voxel_kernels(target, source, kernels);
+    classification_kernel(target, plan, ways.classification, kernels);
+    shading_kernel(target, ways.shading, kernels);
+    compositing_kernel(target, ways.compositing, kernels);
     return kernels;
 }
 

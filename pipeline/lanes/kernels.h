@@ -1,7 +1,9 @@
-// The stages as kernels over a batch: function pointers, chosen once a render for a SIMD target and a width
-// of lanes.
+// The stages as kernels over a batch: function pointers, chosen once a render for a SIMD target, a width of
+// lanes, a layout of the volume and what is known of the roundings.
 #pragma once
 
+#include "pipeline/lanes/cell_blocks.h"
+#include "pipeline/lanes/empty_space.h"
 #include "pipeline/lanes/packet.h"
 #include "pipeline/plan.h"
 
@@ -11,9 +13,25 @@
 
 namespace squint::lanes {
 
+/// Where voxels are fetched from.
+struct VoxelSource {
+    const Volume* volume = nullptr;
+    const std::uint8_t* cells = nullptr;  // null: from the volume itself
+    Index3 blocks{0, 0, 0};
+    std::vector<std::int32_t> slots;  // of each block: its first cell, or -1: from the volume itself
+};
+
 struct StageKernels {
+    /// Steps from slab k that every ray of the packet can leave out: all of them stay in blocks where nothing
+    /// is to be seen.  At most `most`.
+    int (*leave_out)(const EmptySpace&, const RayCourse&, const RayPacket&, const PixelPacket&, const Index3& dims,
+                     int k, int most) = nullptr;
     /// Rows [from, to): cells, weights and slab lengths.
     void (*locate)(const Plan&, const RayPacket&, int from, int to, Samples&) = nullptr;
+    /// Rows [from, to): where the voxels lie, and a request to memory for them.
+    void (*prefetch)(const VoxelSource&, int from, int to, Samples&) = nullptr;
+    /// Rows [from, to): corners by pairs.
+    void (*fetch)(const VoxelSource&, int from, int to, Samples&) = nullptr;
     /// Rows [from, to): corners to inputs.
     void (*interpolate)(const Plan&, int from, int to, Samples&) = nullptr;
     /// Slabs [0, steps): inputs to colours and opacities.
@@ -24,10 +42,16 @@ struct StageKernels {
     void (*composite)(const Plan&, const RayPacket&, int steps, const Samples&, PixelPacket&) = nullptr;
 };
 
-/// Bits of the lanes each stage runs in: 32 or 64.
-struct StageWidths {
-    int location = 32, interpolation = 32, input = 32, classification = 32, shading = 64, compositing = 32;
+/// How one stage runs: bits of its lanes, 32 or 64, and what its kernel may take for granted.
+struct StageWay {
+    int bits = 32;
+    KnownRescales known = KnownRescales::nothing;
 };
+struct StageWays {
+    StageWay location, interpolation, classification, shading, compositing;
+    StageWay input;  // from a sample to table entries: no narrower than interpolation
+};
+StageWays ways_of(const Plan& plan);
 
 /// One of Highway's targets this processor has, by name; the best for an empty name.  Throws InputError,
 /// listing those there are.
@@ -35,13 +59,25 @@ std::int64_t find_target(const std::string& name);
 std::vector<std::string> target_names();  // best first
 std::string target_name(std::int64_t target);
 
-StageKernels kernels_for(const Plan& plan, const StageWidths& widths, std::int64_t target);
+StageKernels kernels_for(const Plan& plan, const StageWays& ways, const VoxelSource& source,
+                         std::int64_t target);
 
 // One a file of kernels.
-void sampling_kernels(std::int64_t target, const StageWidths& widths, StageKernels& kernels);
-void classification_kernel(std::int64_t target, const Plan& plan, const StageWidths& widths,
-                           StageKernels& kernels);
-void shading_kernel(std::int64_t target, StageKernels& kernels);
-void compositing_kernel(std::int64_t target, const StageWidths& widths, StageKernels& kernels);
+void sampling_kernels(std::int64_t target, const StageWays& ways, StageKernels& kernels);
+void voxel_kernels(std::int64_t target, const VoxelSource& source, StageKernels& kernels);
+void classification_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);
+void shading_kernel(std::int64_t target, const StageWay& way, StageKernels& kernels);
+void compositing_kernel(std::int64_t target, const StageWay& way, StageKernels& kernels);
+
+/// Calls f with the word for a way; `Known` is what a kernel is compiled to take for granted where it can.
+template <template <class, KnownRescales> class Lanes, KnownRescales Known, class F>
+void with_word(const StageWay& way, F&& f) {
+    if (way.bits == 64)
+        f.template operator()<Lanes<std::int64_t, KnownRescales::nothing>>();
+    else if (way.known >= Known)
+        f.template operator()<Lanes<std::int32_t, Known>>();
+    else
+        f.template operator()<Lanes<std::int32_t, KnownRescales::nothing>>();
+}
 
 }  // namespace squint::lanes

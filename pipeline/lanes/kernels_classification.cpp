@@ -27,12 +27,11 @@ void classify_rows(const Plan& plan, int steps, lanes::Samples& samples) {
 
 }  // namespace
 
-void classification_kernel_of(const Plan& plan, const lanes::StageWidths& widths,
-                              lanes::StageKernels& kernels) {
+void classification_kernel_of(const Plan& plan, const lanes::StageWay& way, lanes::StageKernels& kernels) {
     std::visit(
         [&]<class M>(const M&) {
-            kernels.classify = widths.classification == 32 ? &classify_rows<Lanes<std::int32_t>, M>
-                                                           : &classify_rows<Lanes<std::int64_t>, M>;
+            lanes::with_word<Lanes, KnownRescales::halves_to_even>(
+                way, [&]<class L>() { kernels.classify = &classify_rows<L, M>; });
         },
         plan.method);
 }
@@ -42,9 +41,8 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace squint::lanes {
-void classification_kernel(std::int64_t target, const Plan& plan, const StageWidths& widths,
-                           StageKernels& kernels) {
-    SQUINT_CALL_TARGET(target, classification_kernel_of, plan, widths, kernels)
+void classification_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels) {
+    SQUINT_CALL_TARGET(target, classification_kernel_of, plan, way, kernels)
 }
 }  // namespace squint::lanes
 #endif

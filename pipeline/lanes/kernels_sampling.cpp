@@ -21,9 +21,6 @@ template <class L>
 void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int to, lanes::Samples& out) {
     const LocationStage stage = plan.location;  // a copy: nothing stored can change it
     const L full = constant<L>(std::int64_t{1} << stage.length_fraction);
-    const Index3 dims = plan.volume->dims;
-    const L row_length = constant<L>(dims.x),
-            slice = constant<L>(dims.x * dims.y);  // wrap where `index` is not used
     for (int r = 0; r < kRays; r += static_cast<int>(L::count())) {
         RayWords<L> ray;
         for (std::size_t a = 0; a < 3; ++a) {
@@ -44,48 +41,59 @@ void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int
                 store(position.cell[a], out.cell[a].v + at);
                 store(position.weight[a], out.weight[a].v + at);
             }
-            store(position.cell[0] + row_length * position.cell[1] + slice * position.cell[2],
-                  out.index.v + at);
             store(select(k == last_slab, last_length, full), out.length.v + at);
         }
     }
 }
+
+/// A cell as it is fetched: two corners a word.
+template <class L>
+struct PackedCell {
+    std::array<L, 4> pair;
+    L at(int i) const {
+        const auto both = pair[static_cast<std::size_t>(i / 2)].v;
+        return {hn::And(i % 2 ? hn::ShiftRight<16>(both) : both, constant<L>(0xffff).v)};
+    }
+    L along_x(int i, L weight, int weight_bits) const {
+        if constexpr (sizeof(typename L::Element) == 4)
+            if (weight_bits <= 14) return {blend_pairs(pair[static_cast<std::size_t>(i)].v, weight.v, weight_bits)};
+        return blend(at(2 * i), at(2 * i + 1), weight, weight_bits);
+    }
+};
 
 /// I: the lanes of the way from a sample to table entries, no narrower than L.
 template <class L, class I>
 void interpolate_rows(const Plan& plan, int from, int to, lanes::Samples& samples) {
     const InterpolationStage stage = plan.interpolation;
     const InputStage input = plan.input;
-    const L low_half = constant<L>(0xffff);
     for (int at = from * kRays; at < to * kRays; at += static_cast<int>(L::count())) {
-        Cell<L> cell;
-        for (std::size_t i = 0; i < 4; ++i) {
-            const L pair = load<L>(samples.pair[i].v + at);
-            cell.corner[2 * i] = {hn::And(pair.v, low_half.v)};
-            cell.corner[2 * i + 1] = {hn::And(hn::ShiftRight<16>(pair.v), low_half.v)};
-        }
+        PackedCell<L> cell;
+        for (std::size_t i = 0; i < 4; ++i) cell.pair[i] = load<L>(samples.pair[i].v + at);
         const std::array<L, 3> weight{load<L>(samples.weight[0].v + at), load<L>(samples.weight[1].v + at),
                                       load<L>(samples.weight[2].v + at)};
         const L sample = interpolate(stage, cell, weight);
-        if constexpr (std::is_same_v<L, I>)
-            store(classification_input(input, sample), samples.input.v + at);
+        if constexpr (L::count() == I::count())
+            store(classification_input(input, I{sample.v}), samples.input.v + at);
         else
             store(sample, samples.input.v + at);
     }
-    if constexpr (!std::is_same_v<L, I>)
+    if constexpr (L::count() != I::count())
         for (int at = from * kRays; at < to * kRays; at += static_cast<int>(I::count()))
             store(classification_input(input, load<I>(samples.input.v + at)), samples.input.v + at);
 }
 
 }  // namespace
 
-void sampling_kernels_of(const lanes::StageWidths& widths, lanes::StageKernels& kernels) {
-    using Narrow = Lanes<std::int32_t>;
-    using Wide = Lanes<std::int64_t>;
-    kernels.locate = widths.location == 32 ? &locate_rows<Narrow> : &locate_rows<Wide>;
-    kernels.interpolate = widths.interpolation == 64 ? &interpolate_rows<Wide, Wide>
-                          : widths.input == 64       ? &interpolate_rows<Narrow, Wide>
-                                                     : &interpolate_rows<Narrow, Narrow>;
+void sampling_kernels_of(const lanes::StageWays& ways, lanes::StageKernels& kernels) {
+    lanes::with_word<Lanes, KnownRescales::halves_up>(
+        ways.location, [&]<class L>() { kernels.locate = &locate_rows<L>; });
+    lanes::with_word<Lanes, KnownRescales::halves_up>(ways.interpolation, [&]<class L>() {
+        if constexpr (sizeof(typename L::Element) == 8)
+            kernels.interpolate = &interpolate_rows<L, L>;
+        else
+            lanes::with_word<Lanes, KnownRescales::halves_to_even>(
+                ways.input, [&]<class I>() { kernels.interpolate = &interpolate_rows<L, I>; });
+    });
 }
 
 }  // namespace squint::HWY_NAMESPACE
@@ -93,8 +101,8 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace squint::lanes {
-void sampling_kernels(std::int64_t target, const StageWidths& widths, StageKernels& kernels) {
-    SQUINT_CALL_TARGET(target, sampling_kernels_of, widths, kernels)
+void sampling_kernels(std::int64_t target, const StageWays& ways, StageKernels& kernels) {
+    SQUINT_CALL_TARGET(target, sampling_kernels_of, ways, kernels)
 }
 }  // namespace squint::lanes
 #endif

@@ -17,15 +17,18 @@ namespace {
 /// A neighbourhood whose voxels are loaded as they are asked for.
 template <class L>
 struct StoredNeighbourhood {
-    const lanes::Batch* voxel;
+    const lanes::Batch* pair;
     int place;
-    L at(int x, int y, int z) const { return load<L>(voxel[(z * 4 + y) * 4 + x].v + place); }
+    L at(int x, int y, int z) const {
+        const L both = load<L>(pair[(z * 4 + y) * 2 + x / 2].v + place);
+        return {hn::And(x % 2 ? hn::ShiftRight<16>(both.v) : both.v, constant<L>(0xffff).v)};
+    }
 };
 
 template <class L>
 HWY_INLINE std::array<L, 3> stored_gradient(const GradientStage& s, const lanes::LitSamples& lit, int end,
                                             int at) {
-    const StoredNeighbourhood<L> near{lit.voxel[end], at};
+    const StoredNeighbourhood<L> near{lit.pair[end], at};
     const std::array<L, 3> weight{load<L>(lit.weight[end][0].v + at), load<L>(lit.weight[end][1].v + at),
                                   load<L>(lit.weight[end][2].v + at)};
     std::array<L, 3> gradient;
@@ -62,8 +65,9 @@ void shade_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
 
 }  // namespace
 
-void shading_kernel_of(lanes::StageKernels& kernels) {
-    kernels.shade = &shade_samples<Lanes<std::int64_t>>;
+void shading_kernel_of(const lanes::StageWay& way, lanes::StageKernels& kernels) {
+    lanes::with_word<Lanes, KnownRescales::halves_to_even>(
+        way, [&]<class L>() { kernels.shade = &shade_samples<L>; });
 }
 
 }  // namespace squint::HWY_NAMESPACE
@@ -71,8 +75,8 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace squint::lanes {
-void shading_kernel(std::int64_t target, StageKernels& kernels) {
-    SQUINT_CALL_TARGET(target, shading_kernel_of, kernels)
+void shading_kernel(std::int64_t target, const StageWay& way, StageKernels& kernels) {
+    SQUINT_CALL_TARGET(target, shading_kernel_of, way, kernels)
 }
 }  // namespace squint::lanes
 #endif

@@ -23,9 +23,21 @@ int bits_of(const WordNeeds& needs) {
     return needs.lane_bits <= 32 ? 32 : needs.lane_bits <= 64 ? 64 : 0;
 }
 
-StageWidths widths_of(const Plan& plan) {
-    const auto bits = [&](std::size_t stage) { return bits_of(plan.stages[stage].needs); };
-    return {bits(0), bits(1), bits_of(plan.input_needs), bits(3), 64, bits(5)};
+// The most that is known of a stage's roundings, in 32-bit lanes.
+struct KnownOf {
+    KnownRescales known = KnownRescales::halves_up;
+    void operator()(const Rescale& to) {
+        while (!holds(known, to, 32)) known = known == KnownRescales::halves_up ? KnownRescales::halves_to_even : KnownRescales::nothing;
+    }
+    void operator()(const Table&) {}
+    void operator()(const CellTable&) {}
+};
+template <class... Stage>
+KnownRescales known_of(Stage... stage) {
+    KnownOf all;
+    const auto visit = [&](auto& r) { all(r); };
+    (stage.visit(visit), ...);
+    return all.known;
 }
 
 // ------------------------------------------------------------------------------------------------ rays
@@ -39,7 +51,6 @@ struct PacketSetup {
     PixelPlace place[kRays];
     RaySetup ray[kRays];
     int most_slabs = 0, rays = 0;
-    double fastest[3] = {0, 0, 0};  // most voxels a step moves, per axis
 };
 
 void set_up_packet(const Plan& plan, int left, int top, int right, int bottom, PacketSetup& setup,
@@ -52,7 +63,6 @@ void set_up_packet(const Plan& plan, int left, int top, int right, int bottom, P
         const RaySetup& ray = setup.ray[r];
         setup.most_slabs = std::max(setup.most_slabs, ray.slabs);
         setup.rays += ray.slabs > 0;
-        for (int a = 0; a < 3; ++a) setup.fastest[a] = std::max(setup.fastest[a], std::abs(ray.step[a]));
         const RayWords<std::int64_t> words = ray_words<std::int64_t>(plan, ray);
         for (std::size_t a = 0; a < 3; ++a) {
             packet.first[a].v[r] = static_cast<Word>(words.first[a]);
@@ -70,114 +80,65 @@ void set_up_packet(const Plan& plan, int left, int top, int right, int bottom, P
 
 // ------------------------------------------------------------------------------------------------ voxels
 
-// Where voxels lie: offsets from a cell's lower corner to its four pairs along x.
-struct PairOffsets {
-    std::int64_t pair[4];
-    bool wide;  // indices need 64 bits
-    explicit PairOffsets(const Volume& volume) : wide(volume.voxels() > std::numeric_limits<Word>::max()) {
-        const std::int64_t y = volume.dims.y > 1 ? volume.dims.x : 0,
-                           z = volume.dims.z > 1 ? volume.dims.x * volume.dims.y : 0;
-        pair[0] = 0, pair[1] = y, pair[2] = z, pair[3] = y + z;
-    }
-};
-
-std::int64_t corner_index(const Volume& volume, const PairOffsets& offsets, const Samples& s, int i) {
-    if (!offsets.wide) return s.index.v[i];
-    return s.cell[0].v[i] + (s.cell[1].v[i] + s.cell[2].v[i] * volume.dims.y) * volume.dims.x;
-}
-
-// Corners of each sample's cell as four pairs along x.
+// The 4x4x4 voxels about a cell, or as many of them as a gradient wants, by pairs along x.
 template <class T>
-void fetch_pairs(const Volume& volume, const PairOffsets& offsets, int from, int to, Samples& samples) {
+void fetch_neighbourhood_at(const Volume& volume, const Index3& cell, GradientRule rule, int at, Batch* pair) {
     const T* data = static_cast<const T*>(volume.data.get());
-    const T* base[4] = {data, data + offsets.pair[1], data + offsets.pair[2], data + offsets.pair[3]};
-    for (int i = from * kRays; i < to * kRays; ++i) {
-        const std::int64_t at = corner_index(volume, offsets, samples, i);
-        for (int p = 0; p < 4; ++p) {
-            if constexpr (sizeof(T) == 2) {
-                std::memcpy(&samples.pair[p].v[i], base[p] + at, 4);
-            } else {
-                std::uint16_t both;
-                std::memcpy(&both, base[p] + at, 2);
-                samples.pair[p].v[i] = (both & 0xff) | (both >> 8) << 16;
-            }
-        }
-    }
-}
-
-// Asks for the voxels of a batch to come: every second step will do, for neighbours share cache lines.
-template <class T>
-void prefetch_pairs(const Volume& volume, const PairOffsets& offsets, int from, int to,
-                    const Samples& samples) {
-    const T* data = static_cast<const T*>(volume.data.get());
-    for (int row = from; row < to; row += 2)
-        for (int i = row * kRays; i < (row + 1) * kRays; ++i) {
-            const T* corner = data + corner_index(volume, offsets, samples, i);
-            for (const std::int64_t offset : offsets.pair) __builtin_prefetch(corner + offset);
-        }
-}
-
-template <class T>
-void fetch_neighbourhood_at(const Volume& volume, const Index3& cell, bool corners_only, int at,
-                            Batch* voxel) {
-    const T* data = static_cast<const T*>(volume.data.get());
-    const auto clamped = [](std::int64_t i, std::int64_t n) { return std::clamp<std::int64_t>(i, 0, n - 1); };
-    std::int64_t x[4], y[4], z[4];
-    for (int i = 0; i < 4; ++i) {
-        x[i] = clamped(cell.x + i - 1, volume.dims.x);
-        y[i] = clamped(cell.y + i - 1, volume.dims.y) * volume.dims.x;
-        z[i] = clamped(cell.z + i - 1, volume.dims.z) * volume.dims.x * volume.dims.y;
-    }
-    const int low = corners_only ? 1 : 0, high = corners_only ? 3 : 4;
-    for (int k = low; k < high; ++k)
-        for (int j = low; j < high; ++j)
-            for (int i = low; i < high; ++i) voxel[(k * 4 + j) * 4 + i].v[at] = data[x[i] + y[j] + z[k]];
-}
-
-// ------------------------------------------------------------------------------------------------ empty
-// space
-
-// Steps from sample k that every ray of the packet can leave out: all of them stay in blocks where nothing is
-// to be seen.
-int empty_steps(const Plan& plan, const EmptySpace& empty, const PacketSetup& setup, const RayPacket& packet,
-                const PixelPacket& pixels, int k) {
-    const double cell_unit = std::ldexp(1.0, plan.location.location_fraction);
-    const double direction_unit = std::ldexp(1.0, plan.location.direction_fraction);
-    const auto block_of = [&](double p, int a) {
-        return std::min(static_cast<std::int64_t>(p) >> kBlockBits, empty.blocks[a] - 1);
+    const Index3 n = volume.dims;
+    const auto put = [&](int row, const auto& voxel) {
+        pair[2 * row].v[at] = voxel(0) | voxel(1) << 16, pair[2 * row + 1].v[at] = voxel(2) | voxel(3) << 16;
     };
-    int least = setup.most_slabs - k;
-    for (int r = 0; r < kRays && least > 0; ++r) {
-        if (!pixels.active.v[r] || k >= packet.slabs.v[r]) continue;
-        double p[3];
-        Index3 block;
-        for (int a = 0; a < 3; ++a) {
-            const double limit = static_cast<double>(plan.volume->dims[a] - 1);
-            p[a] = std::clamp(packet.first[a].v[r] / cell_unit + k * (packet.step[a].v[r] / direction_unit),
-                              0.0, limit);
-            block[a] = block_of(p[a], a);
-        }
-        const int distance = empty.at(block.x, block.y, block.z);
-        if (distance == 0) return 0;
-        double steps = setup.most_slabs;
-        for (int a = 0; a < 3; ++a) {
-            const double v = packet.step[a].v[r] / direction_unit;
-            if (v == 0) continue;
-            // To the far side of the empty blocks ahead, less what rounding can move a sample.
-            const double side = v > 0 ? static_cast<double>((block[a] + distance) << kBlockBits) - p[a]
-                                      : p[a] - static_cast<double>((block[a] - distance + 1) << kBlockBits);
-            steps = std::min(steps, (side - 1e-3) / std::abs(v));
-        }
-        // Sample k + m is the last one inside: m + 1 slabs may go (the next sample is looked at anew).
-        least = std::min(least, steps < 0 ? 0 : static_cast<int>(steps) + 1);
-        // The ray's last sample stands at its exit, off P0 + kV by what rounding V adds up to.
-        const int last = packet.last_index.v[r] - (plan.needs_back ? 1 : 0);
-        if (k + least <= last) continue;
-        Index3 exit;
-        for (int a = 0; a < 3; ++a) exit[a] = block_of(packet.last[a].v[r] / cell_unit, a);
-        if (empty.at(exit.x, exit.y, exit.z) == 0) least = std::min(least, std::max(last - k, 0));
+    const auto wanted = [&](int y, int z) {
+        const bool y_inside = y == 1 || y == 2, z_inside = z == 1 || z == 2;
+        return rule == GradientRule::analytic  ? y_inside && z_inside
+               : rule == GradientRule::central ? y_inside || z_inside
+                                               : true;
+    };
+    const auto inside = [](std::int64_t i, std::int64_t count) { return i >= 1 && i + 2 < count; };
+    if (inside(cell.x, n.x) && inside(cell.y, n.y) && inside(cell.z, n.z)) {
+        const T* low = data + (cell.x - 1) + n.x * ((cell.y - 1) + n.y * (cell.z - 1));
+        for (int z = 0; z < 4; ++z)
+            for (int y = 0; y < 4; ++y)
+                if (wanted(y, z)) {
+                    const T* row = low + n.x * (y + n.y * z);
+                    put(z * 4 + y, [&](int x) { return Word{row[x]}; });
+                }
+        return;
     }
-    return least;
+    const auto clamped = [](std::int64_t i, std::int64_t count) { return std::clamp<std::int64_t>(i, 0, count - 1); };
+    for (int z = 0; z < 4; ++z)
+        for (int y = 0; y < 4; ++y)
+            if (wanted(y, z)) {
+                const T* row = data + n.x * (clamped(cell.y + y - 1, n.y) + n.y * clamped(cell.z + z - 1, n.z));
+                put(z * 4 + y, [&](int x) { return Word{row[clamped(cell.x + x - 1, n.x)]}; });
+            }
+}
+
+// ------------------------------------------------------------------------------------------------ empty space
+
+// About where the rays run, for leaving out empty space.
+void set_course(const Plan& plan, const EmptySpace& empty, const RayPacket& rays, RayCourse& course) {
+    const auto cell_unit = static_cast<float>(std::ldexp(1.0, -plan.location.location_fraction));
+    const auto step_unit = static_cast<float>(std::ldexp(1.0, -plan.location.direction_fraction));
+    // A location is rounded once, by a last bit at most; floats add their own error.
+    float largest = 1;
+    for (int a = 0; a < 3; ++a) largest = std::max(largest, static_cast<float>(plan.volume->dims[a]));
+    course.margin = cell_unit + largest * 0x1p-20F + 0x1p-10F;
+    for (int r = 0; r < kRays; ++r) {
+        Index3 exit;
+        for (int a = 0; a < 3; ++a) {
+            course.first[a].v[r] = static_cast<float>(rays.first[a].v[r]) * cell_unit;
+            const float step = static_cast<float>(rays.step[a].v[r]) * step_unit;
+            course.step[a].v[r] = step;
+            course.pace[a].v[r] = step == 0 ? 1e30F : 1 / std::abs(step);
+            exit[a] = std::min<std::int64_t>((rays.last[a].v[r] >> plan.location.location_fraction) >> kBlockBits,
+                                             empty.blocks[a] - 1);
+        }
+        // The ray's last sample stands at its exit, off P0 + kV by what rounding V adds up to.
+        course.skippable.v[r] = empty.at(exit.x, exit.y, exit.z) > 0
+                                    ? std::numeric_limits<Word>::max()
+                                    : rays.last_index.v[r] - (plan.needs_back ? 1 : 0);
+    }
 }
 
 bool any_active(const PixelPacket& pixels) {
@@ -185,6 +146,20 @@ bool any_active(const PixelPacket& pixels) {
 }
 
 }  // namespace
+
+StageWays ways_of(const Plan& plan) {
+    const auto bits = [&](std::size_t stage) { return bits_of(plan.stages[stage].needs); };
+    StageWays ways;
+    KnownOf location;
+    location(plan.location.to_location), location(plan.location.to_weight);
+    ways.location = {bits(0), location.known};
+    ways.input = {bits_of(plan.input_needs), known_of(plan.input)};
+    ways.interpolation = {bits(1), known_of(plan.interpolation)};
+    ways.classification = {bits(3), std::visit([](const auto& m) { return known_of(m); }, plan.method)};
+    ways.shading = {std::max(bits(2), bits(4)), known_of(plan.gradient, plan.shading)};
+    ways.compositing = {bits(5), known_of(plan.compositing)};
+    return ways;
+}
 
 std::optional<std::string> what_needs_the_model(const Plan& plan) {
     if (plan.real) return "nothing is rounded";
@@ -219,8 +194,7 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
 LaneRenderer::LaneRenderer(const Plan& plan, const RenderOptions& options)
     : plan_(plan),
       target_(find_target(options.target)),
-      widths_(widths_of(plan)),
-      kernels_(kernels_for(plan, widths_, target_)) {
+      ways_(ways_of(plan)) {
     // A slab's two ends must lie in neighbouring blocks; its far one may be off by what V's rounding adds up
     // to.
     const double drift =
@@ -229,20 +203,47 @@ LaneRenderer::LaneRenderer(const Plan& plan, const RenderOptions& options)
     if (options.skip && plan.skips_empty_space && reachable)
         empty_ =
             find_empty_space(*block_ranges(*plan.volume), plan.entries, plan.needs_back, plan.entry_reach);
+    choose_layout(options);
+    kernels_ = kernels_for(plan, ways_, voxels_, target_);
+}
+
+void LaneRenderer::choose_layout(const RenderOptions& options) {
+    const Volume& volume = *plan_.volume;
+    const std::int64_t all = CellBlocks::bytes_of_all(volume);
+    voxels_.volume = plan_.volume.get();
+    if (options.layout == LayoutRule::linear) {
+        layout_ = "linear: as asked";
+        return;
+    }
+    if (options.layout == LayoutRule::automatic) {
+        // Cells pay where a block is met by many more samples than it takes voxels to build.
+        const double samples = static_cast<double>(plan_.camera.width) * plan_.camera.height *
+                               static_cast<double>(std::max({volume.dims.x, volume.dims.y, volume.dims.z})) / plan_.scene.sampling.step;
+        if (samples < 8 * static_cast<double>(volume.voxels())) {
+            layout_ = "linear: too few samples for cells to pay";
+            return;
+        }
+    }
+    cells_ = cell_blocks(volume, options.layout_bytes);
+    // Rays that leave out empty space still meet the blocks beside it.  Cells and empty space share their blocks.
+    static_assert(CellBlocks::kBits == kBlockBits);
+    cells_->build([&](std::int64_t block) { return !empty_ || empty_->distance[static_cast<std::size_t>(block)] <= 1; });
+    if (cells_->room() > 0) voxels_.cells = cells_->data(), voxels_.blocks = cells_->blocks(), voxels_.slots = cells_->slots();
+    layout_ = fmt::format("cells: 2x2x2 voxels side by side, {:.1f} MiB if all were met, room for {:.1f} MiB",
+                          static_cast<double>(all) / 0x1p20, static_cast<double>(cells_->room()) / 0x1p20);
 }
 
 std::string LaneRenderer::why() const {
-    const auto name = [](int bits) { return std::to_string(bits); };
-    return fmt::format("lanes of {}/{}/{}/{} bits (location, interpolation, classification, compositing)",
-                       name(widths_.location), name(widths_.interpolation), name(widths_.classification),
-                       name(widths_.compositing)) +
-           (plan_.lit ? ", shading 64" : "") +
-           (empty_ ? fmt::format("; {} of {} blocks visible", empty_->visible_blocks, empty_->distance.size())
-                   : "");
+    std::string text = fmt::format(
+        "lanes of {}/{}/{}/{} bits (location, interpolation, classification, compositing)",
+        ways_.location.bits, ways_.interpolation.bits, ways_.classification.bits, ways_.compositing.bits);
+    if (plan_.lit) text += fmt::format(", shading {}", ways_.shading.bits);
+    if (empty_) text += fmt::format("; {} of {} blocks visible", empty_->visible_blocks, empty_->distance.size());
+    return text;
 }
 
 std::int64_t LaneRenderer::bytes() const {
-    return empty_ ? static_cast<std::int64_t>(5 * empty_->distance.size()) : 0;
+    return (empty_ ? static_cast<std::int64_t>(5 * empty_->distance.size()) : 0) + (cells_ ? cells_->bytes() : 0);
 }
 
 namespace {
@@ -251,6 +252,7 @@ namespace {
 struct Workspace {
     PacketSetup setup;
     RayPacket rays;
+    RayCourse course;
     PixelPacket pixels;
     Samples samples[2];  // this batch, and the next one's locations
     LitSamples lit;
@@ -258,23 +260,28 @@ struct Workspace {
 
 class PacketLoop {
   public:
-    PacketLoop(const Plan& plan, const StageKernels& kernels, const EmptySpace* empty, Workspace& w)
+    PacketLoop(const Plan& plan, const StageKernels& kernels, const VoxelSource& voxels, const EmptySpace* empty,
+               Workspace& w)
         : plan_(plan),
           kernels_(kernels),
+          voxels_(voxels),
           empty_(empty),
-          offsets_(*plan.volume),
           w_(w),
           backwards_(plan.compositing.form == CompositingForm::back_to_front) {}
 
     /// All slabs of a packet whose rays are set up.
     void run() {
-        located_ = -1;
+        located_ = -1, visited_ = 0;
         start_pixels();
+        if (empty_) set_course(plan_, *empty_, w_.rays, w_.course);
         if (backwards_)
             run_backwards();
         else
             run_forwards();
     }
+
+    /// Slabs of the packet, of all its rays, that went through the stages.
+    std::int64_t visited() const { return visited_; }
 
   private:
     void start_pixels() {
@@ -311,7 +318,8 @@ class PacketLoop {
     // Slabs that composite nothing; they count as composited, as in the model.
     int leave_out(int k) {
         if (!empty_) return 0;
-        const int steps = empty_steps(plan_, *empty_, w_.setup, w_.rays, w_.pixels, k);
+        const int steps = kernels_.leave_out(*empty_, w_.course, w_.rays, w_.pixels, plan_.volume->dims, k,
+                                             w_.setup.most_slabs - k);
         for (int r = 0; r < kRays && steps > 0; ++r)
             if (w_.pixels.active.v[r]) w_.pixels.samples.v[r] += std::clamp(w_.rays.slabs.v[r] - k, 0, steps);
         return steps;
@@ -325,40 +333,35 @@ class PacketLoop {
 
     // Slabs k to k + steps through all stages.
     void batch(int k, int steps, bool carried) {
+        const int from = carried ? 1 : 0, to = steps + (plan_.needs_back ? 1 : 0);
         if (located_ == k) {
             current_ = 1 - current_;
             if (carried) carry(w_.samples[1 - current_], here());
         } else {
             if (carried) carry(here(), here());
-            here().first = k;
-            kernels_.locate(plan_, w_.rays, carried ? 1 : 0, steps + (plan_.needs_back ? 1 : 0), here());
+            locate(here(), k, from, to);
         }
         Samples& s = here();
-        const int from = carried ? 1 : 0, to = steps + (plan_.needs_back ? 1 : 0);
         if (!backwards_) look_ahead(k + kSteps);
-        if (plan_.volume->type == ScalarType::u8)
-            fetch_pairs<std::uint8_t>(*plan_.volume, offsets_, from, to, s);
-        else
-            fetch_pairs<std::uint16_t>(*plan_.volume, offsets_, from, to, s);
+        kernels_.fetch(voxels_, from, to, s);
         kernels_.interpolate(plan_, from, to, s);
         kernels_.classify(plan_, steps, s);
         if (plan_.lit) light(steps);
         kernels_.composite(plan_, w_.rays, steps, s, w_.pixels);
+        visited_ += steps * w_.setup.rays;
+    }
+
+    void locate(Samples& s, int k, int from, int to) {
+        s.first = k;
+        kernels_.locate(plan_, w_.rays, from, to, s);
+        kernels_.prefetch(voxels_, from, to, s);
     }
 
     // Locations of the batch at k, and its voxels on their way from memory while this batch computes.
     void look_ahead(int k) {
         located_ = -1;
         if (k >= w_.setup.most_slabs) return;
-        Samples& next = w_.samples[1 - current_];
-        next.first = k;
-        kernels_.locate(plan_, w_.rays, plan_.needs_back ? 1 : 0, samples_for(k), next);
-        if (plan_.volume->type == ScalarType::u8)
-            prefetch_pairs<std::uint8_t>(*plan_.volume, offsets_, plan_.needs_back ? 1 : 0, samples_for(k),
-                                         next);
-        else
-            prefetch_pairs<std::uint16_t>(*plan_.volume, offsets_, plan_.needs_back ? 1 : 0, samples_for(k),
-                                          next);
+        locate(w_.samples[1 - current_], k, plan_.needs_back ? 1 : 0, samples_for(k));
         located_ = k;
     }
 
@@ -393,15 +396,15 @@ class PacketLoop {
     void gather_lit(int at, int ray, int i) {
         const Samples& s = here();
         LitSamples& lit = w_.lit;
-        const bool corners_only = plan_.gradient.rule == GradientRule::analytic;
+        const Volume& volume = *plan_.volume;
         for (int end = 0; end < (plan_.needs_back ? 2 : 1); ++end) {
             const int here = at + end * kRays;
             const Index3 cell(s.cell[0].v[here], s.cell[1].v[here], s.cell[2].v[here]);
             for (int a = 0; a < 3; ++a) lit.weight[end][a].v[i] = s.weight[a].v[here];
-            if (plan_.volume->type == ScalarType::u8)
-                fetch_neighbourhood_at<std::uint8_t>(*plan_.volume, cell, corners_only, i, lit.voxel[end]);
+            if (volume.type == ScalarType::u8)
+                fetch_neighbourhood_at<std::uint8_t>(volume, cell, plan_.gradient.rule, i, lit.pair[end]);
             else
-                fetch_neighbourhood_at<std::uint16_t>(*plan_.volume, cell, corners_only, i, lit.voxel[end]);
+                fetch_neighbourhood_at<std::uint16_t>(volume, cell, plan_.gradient.rule, i, lit.pair[end]);
         }
         for (int c = 0; c < 3; ++c) lit.color[c].v[i] = s.color[c].v[at];
         lit.alpha.v[i] = s.alpha.v[at];
@@ -415,12 +418,13 @@ class PacketLoop {
 
     const Plan& plan_;
     const StageKernels& kernels_;
+    const VoxelSource& voxels_;
     const EmptySpace* empty_;
-    PairOffsets offsets_;
     Workspace& w_;
     bool backwards_;
     int current_ = 0;
     int located_ = -1;  // first slab of the batch whose locations stand in the other buffer
+    std::int64_t visited_ = 0;
 };
 
 }  // namespace
@@ -429,7 +433,7 @@ void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& 
                                TileStatistics& statistics) const {
     const auto workspace = std::make_unique<Workspace>();
     Workspace& w = *workspace;
-    PacketLoop loop(plan_, kernels_, empty_ ? &*empty_ : nullptr, w);
+    PacketLoop loop(plan_, kernels_, voxels_, empty_ ? &*empty_ : nullptr, w);
     for (int y = top; y < bottom; y += kSide)
         for (int x = left; x < right; x += kSide) {
             w.setup = {};
@@ -445,7 +449,7 @@ void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& 
                 store_pixel(plan_, pixel, place.column, place.row, image);
                 statistics.samples += pixel.samples;
             }
-            statistics.rays += w.setup.rays;
+            statistics.rays += w.setup.rays, statistics.visited += loop.visited();
         }
 }
 

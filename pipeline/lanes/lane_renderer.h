@@ -8,6 +8,7 @@
 #include "pipeline/model.h"
 #include "pipeline/render.h"
 
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -29,12 +30,20 @@ class LaneRenderer {
     std::string why() const;
     std::int64_t bytes() const;
 
+    /// How the volume lies in memory, and why.
+    std::string layout() const { return layout_; }
+
   private:
+    void choose_layout(const RenderOptions& options);
+
     const Plan& plan_;
     std::int64_t target_;
-    StageWidths widths_;
+    StageWays ways_;
     StageKernels kernels_;
     std::optional<EmptySpace> empty_;
+    std::shared_ptr<CellBlocks> cells_;
+    VoxelSource voxels_;
+    std::string layout_;
 };
 
 }  // namespace squint::lanes

@@ -22,6 +22,9 @@ struct alignas(64) Batch {
 struct alignas(64) Row {
     Word v[kRays];
 };
+struct alignas(64) RealRow {
+    float v[kRays];
+};
 
 /// Sixteen rays, set up; those that miss have no slabs.
 struct alignas(64) RayPacket {
@@ -29,22 +32,30 @@ struct alignas(64) RayPacket {
     Row half[kMostHalves][3], view[3];
 };
 
+/// The same rays for leaving out empty space: about where they are, never used to take a sample.
+struct alignas(64) RayCourse {
+    RealRow first[3], step[3];  // voxels
+    RealRow pace[3];            // steps a voxel
+    Row skippable;              // no sample from this one on can be left out
+    float margin;               // voxels a sample may lie off its course
+};
+
 /// One batch: row s of ray r at s * kRays + r.  Row 0 is sample `first`.
 struct alignas(64) Samples {
     Word first = 0;
     Batch cell[3], weight[3];
-    Batch index;               // of the cell's lower corner in the volume, where 32 bits hold it
-    Batch pair[4];          // corners by pairs along x: the lower in the low half; y fastest
-    Batch input;            // classification input
-    Batch length;           // of the slab, in steps
-    Batch color[3], alpha;  // of the slab
+    Batch place;                          // of the cell among the cells in memory, or below 0 (see VoxelSource)
+    Batch pair[4];                        // corners by pairs along x: the lower in the low half; y fastest
+    Batch input;                          // classification input
+    Batch length;                         // of the slab, in steps
+    Batch color[3], alpha;                // of the slab
 };
 
 /// Samples to be lit, gathered from a batch: dense, so that transparent ones cost nothing.
 struct alignas(64) LitSamples {
     std::array<std::int16_t, kBatch> from;  // place in the batch
     Batch weight[2][3];                     // of the front sample, and of the back one where a slab has two
-    Batch voxel[2][64];                     // their neighbourhoods
+    Batch pair[2][32];                      // the 4x4x4 voxels about its cell, by pairs along x
     Batch half[kMostHalves][3], view[3];
     Batch color[3], alpha;
 };

@@ -9,20 +9,19 @@
 namespace squint {
 namespace {
 
-TEST(Words, SquareRootIsTheFloorOfTheRoot) {
-    const auto check = [](std::int64_t x) {
-        const std::int64_t root = square_root(x);
-        ASSERT_LE(root * root, x);
-        ASSERT_GT((root + 1) * (root + 1), x) << x;
-        ASSERT_TRUE(square_root(Int128{x}) == root);
-    };
-    for (std::int64_t x = 0; x < 1 << 20; ++x) check(x);
+TEST(Words, VectorLengthIsTheFloorOfTheLength) {
     std::mt19937_64 random(3);
-    for (int i = 0; i < 300'000; ++i) {
-        const auto root = static_cast<std::int64_t>(random() >> 38);  // squares up to 2^52, and beside them
-        check(root * root);
-        if (root > 0) check(root * root - 1), check(root * root + 2 * root);
-        check(static_cast<std::int64_t>(random() >> (12 + random() % 50)));
+    for (int i = 0; i < 600'000; ++i) {
+        std::array<std::int64_t, 3> v;
+        for (std::int64_t& x : v) x = static_cast<std::int64_t>(random() % 32768) >> random() % 15;
+        if (i % 3 == 0) v[2] = 0;  // a plane holds vectors of whole lengths
+        if (i % 12 == 0) v[1] = 0;
+        const int guard = static_cast<int>(random() % 11);
+        const std::int64_t squares = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) << 2 * guard;
+        const std::int64_t root = vector_length(v, guard);
+        ASSERT_LE(root * root, squares);
+        ASSERT_GT((root + 1) * (root + 1), squares) << v[0] << ' ' << v[1] << ' ' << v[2] << ' ' << guard;
+        ASSERT_TRUE((vector_length(std::array<Int128, 3>{v[0], v[1], v[2]}, guard) == root));
     }
 }
 
@@ -118,7 +117,10 @@ TEST(Range, HoldsEveryResultOfEveryOperation) {
             const Rescale up(spec.format.fraction_bits - bits, spec);
             ASSERT_TRUE(holds(quotient(p, q, up), quotient(n, d, up)))
                 << n << " / " << d << " to " << to_string(spec);
-            ASSERT_TRUE(holds(square_root(p), square_root(n)));
+            const auto part = [](std::int64_t x) { return x & 0x7fff; };
+            const std::array<std::int64_t, 3> vector{part(n), part(d), part(n + d)};
+            const std::array<Range, 3> vectors{Range{0, vector[0] + 3}, Range{0, vector[1]}, Range{0, 0x7fff}};
+            ASSERT_TRUE(holds(vector_length(vectors, bits % 11), vector_length(vector, bits % 11)));
             ASSERT_TRUE(holds(bit_length(p), bit_length(n)));
             ASSERT_TRUE(holds(shift_by(p, Range{-bits, bits}), shift_by(n, draw(-bits, bits))));
         }

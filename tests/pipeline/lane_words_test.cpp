@@ -20,7 +20,7 @@ namespace {
 // The integers' overloads; those of lanes are found by their arguments.
 using squint::absolute, squint::affine, squint::bit_length, squint::blend, squint::clamp, squint::floor_shift,
     squint::gather, squint::max, squint::min, squint::quantise, squint::quotient, squint::select,
-    squint::shift_by, squint::shift_left, squint::square_root;
+    squint::shift_by, squint::shift_left, squint::vector_length;
 
 /// Draws operands, runs one operation on lanes and on integers, and keeps the first difference of each.
 template <class T>
@@ -161,13 +161,12 @@ void compare_words(std::vector<std::string>& wrong) {
         compare_arithmetic(compare), compare_quantise(compare), compare_quotients(compare);
         compare_tables(compare, table);
     }
-    if constexpr (sizeof(T) == 8)
-        for (int round = 0; round < 4000 && wrong.size() < 4; ++round)
-            compare(
-                "square_root", [&](int) { return compare.any(26, false); },
-                [](auto x, auto y, auto) {
-                    return square_root(x * x + min(y, x + x));  // floor(sqrt) = x up to x^2 + 2 x
-                });
+    for (int round = 0; round < 4000 && wrong.size() < 4; ++round) {
+        const int guard = static_cast<int>(compare.between(0, 9));
+        compare(
+            "vector_length", [&](int) { return compare.between(0, 3) ? compare.any(15, false) : 0x7fff; },
+            [guard](auto x, auto y, auto z) { return vector_length(std::array{x, y, z}, guard); });
+    }
 }
 
 }  // namespace

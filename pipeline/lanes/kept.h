@@ -1,0 +1,38 @@
+// What is worked out once for a volume and kept while its voxels live.
+#pragma once
+
+#include "core/volume.h"
+
+#include <map>
+#include <memory>
+#include <mutex>
+
+namespace squint::lanes {
+
+template <class T>
+class KeptPerVolume {
+  public:
+    /// What `make` gave for these voxels the last time, unless it is not `good` any more.
+    template <class Make, class Good>
+    std::shared_ptr<T> find(const Volume& volume, Make&& make, Good&& good) {
+        const std::lock_guard lock(mutex_);
+        std::erase_if(kept_, [](const auto& item) { return item.second.voxels.expired(); });
+        if (const auto found = kept_.find(volume.data.get());
+            found != kept_.end() && found->second.dims == volume.dims && good(*found->second.thing))
+            return found->second.thing;
+        const std::shared_ptr<T> thing = make();
+        kept_[volume.data.get()] = {volume.data, volume.dims, thing};
+        return thing;
+    }
+
+  private:
+    struct Kept {
+        std::weak_ptr<const void> voxels;
+        Index3 dims{0, 0, 0};
+        std::shared_ptr<T> thing;
+    };
+    std::mutex mutex_;
+    std::map<const void*, Kept> kept_;
+};
+
+}  // namespace squint::lanes

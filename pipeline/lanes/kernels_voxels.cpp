@@ -1,0 +1,205 @@
+// Between stages 1 and 2: where samples' voxels lie, and their way into registers.  And what of a ray need not be
+// sampled at all.
+#include "pipeline/lanes/targets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "pipeline/lanes/kernels_voxels.cpp"
+#include <hwy/foreach_target.h>
+
+#include "fixedpoint/lanes.h"
+#include "pipeline/lanes/kernels.h"
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+namespace {
+
+using lanes::kRays;
+using lanes::Samples;
+using lanes::VoxelSource;
+using lanes::Word;
+constexpr int kLanes = static_cast<int>(HWY_LANES(Word));
+
+// Offsets in voxels from a cell's lower corner to its four pairs along x.
+struct PairOffsets {
+    std::int64_t pair[4];
+    explicit PairOffsets(const Volume& volume) {
+        const std::int64_t y = volume.dims.y > 1 ? volume.dims.x : 0,
+                           z = volume.dims.z > 1 ? volume.dims.x * volume.dims.y : 0;
+        pair[0] = 0, pair[1] = y, pair[2] = z, pair[3] = y + z;
+    }
+};
+
+// A pair of voxels as two 16-bit words.
+HWY_INLINE Word pair_at(const std::uint16_t* voxels) {
+    Word both;
+    std::memcpy(&both, voxels, 4);
+    return both;
+}
+HWY_INLINE Word pair_at(const std::uint8_t* voxels) {
+    std::uint16_t both;
+    std::memcpy(&both, voxels, 2);
+    return (both & 0xff) | (both >> 8) << 16;
+}
+
+// ------------------------------------------------------------------------------------------------ the volume itself
+
+template <class T>
+HWY_INLINE const T* corner_of(const Volume& volume, const Samples& s, int i) {
+    return static_cast<const T*>(volume.data.get()) + s.cell[0].v[i] +
+           volume.dims.x * (s.cell[1].v[i] + volume.dims.y * s.cell[2].v[i]);
+}
+template <class T>
+void prefetch_linear(const VoxelSource& source, int from, int to, Samples& s) {
+    const PairOffsets offsets(*source.volume);
+    // Every second step will do, for neighbours share cache lines.
+    for (int row = from; row < to; row += 2)
+        for (int i = row * kRays; i < (row + 1) * kRays; ++i)
+            for (const std::int64_t offset : offsets.pair)
+                __builtin_prefetch(corner_of<T>(*source.volume, s, i) + offset);
+}
+template <class T>
+void fetch_linear(const VoxelSource& source, int from, int to, Samples& s) {
+    const PairOffsets offsets(*source.volume);
+    for (int i = from * kRays; i < to * kRays; ++i) {
+        const T* corner = corner_of<T>(*source.volume, s, i);
+        for (int p = 0; p < 4; ++p) s.pair[p].v[i] = pair_at(corner + offsets.pair[p]);
+    }
+}
+
+// ------------------------------------------------------------------------------------------------ cells
+
+template <class T>
+void prefetch_cells(const VoxelSource& source, int from, int to, Samples& s) {
+    const hn::ScalableTag<Word> d;
+    constexpr int kBits = lanes::CellBlocks::kBits;
+    const auto in_block = hn::Set(d, (1 << kBits) - 1), row = hn::Set(d, static_cast<Word>(source.blocks.x)),
+               slice = hn::Set(d, static_cast<Word>(source.blocks.x * source.blocks.y));
+    for (int at = from * kRays; at < to * kRays; at += kLanes) {
+        const auto x = hn::Load(d, s.cell[0].v + at), y = hn::Load(d, s.cell[1].v + at),
+                   z = hn::Load(d, s.cell[2].v + at);
+        const auto block = hn::Add(hn::ShiftRight<kBits>(x),
+                                   hn::Add(hn::Mul(row, hn::ShiftRight<kBits>(y)), hn::Mul(slice, hn::ShiftRight<kBits>(z))));
+        const auto inside = [&](auto p) { return hn::And(p, in_block); };
+        const auto offset = hn::Or(inside(x), hn::Or(hn::ShiftLeft<kBits>(inside(y)), hn::ShiftLeft<2 * kBits>(inside(z))));
+        const auto slot = hn::GatherIndex(d, source.slots.data(), block);
+        hn::Store(hn::Or(slot, offset), d, s.place.v + at);  // -1 stays -1
+    }
+    // A packet's outermost rays stand for those between them.
+    constexpr int kOutermost[] = {0, 3, 12, 15};
+    for (int i = from * kRays; i < to * kRays; i += kRays)
+        for (const int ray : kOutermost)
+            __builtin_prefetch(source.cells + std::int64_t{std::max(s.place.v[i + ray], 0)} * static_cast<std::int64_t>(8 * sizeof(T)));
+}
+template <class T>
+void fetch_cells(const VoxelSource& source, int from, int to, Samples& s) {
+    const hn::ScalableTag<Word> d;
+    const PairOffsets offsets(*source.volume);
+    T spare[kLanes][8];
+    const auto spared = [&](int lane, int at) {  // a cell that is not there is put together here
+        const T* corner = corner_of<T>(*source.volume, s, at + lane);
+        for (int p = 0; p < 4; ++p)
+            spare[lane][2 * p] = corner[offsets.pair[p]], spare[lane][2 * p + 1] = corner[offsets.pair[p] + 1];
+        return reinterpret_cast<const std::uint8_t*>(spare[lane]);
+    };
+    const auto load = [](auto&& address) {
+        if constexpr (sizeof(T) == 1)
+            return load_widened_quads(address);
+        else
+            return load_quads(address);
+    };
+    for (int at = from * kRays; at < to * kRays; at += kLanes) {
+        const Word* place = s.place.v + at;
+        const auto there = [&](int lane) { return source.cells + std::int64_t{place[lane]} * static_cast<std::int64_t>(8 * sizeof(T)); };
+        const bool all_there = hn::AllFalse(d, hn::Lt(hn::Load(d, place), hn::Zero(d)));
+        const auto pairs = all_there ? load(there) : load([&](int lane) { return place[lane] < 0 ? spared(lane, at) : there(lane); });
+        for (std::size_t p = 0; p < 4; ++p) store(Lanes<Word>{pairs[p]}, s.pair[p].v + at);
+    }
+}
+
+// ------------------------------------------------------------------------------------------------ empty space
+
+int leave_out_empty(const lanes::EmptySpace& empty, const lanes::RayCourse& course,
+                    const lanes::RayPacket& rays, const lanes::PixelPacket& pixels, const Index3& dims, int k,
+                    int most) {
+    const hn::ScalableTag<float> df;
+    const hn::ScalableTag<Word> d;
+    const auto zero = hn::Zero(d), one = hn::Set(d, 1);
+    const auto margin = hn::Set(df, course.margin), side = hn::Set(df, float(lanes::kBlock)),
+               inner_side = hn::Sub(side, margin);
+    const std::int64_t counts[3] = {empty.blocks.x, empty.blocks.y, empty.blocks.z};
+    const Word strides[3] = {1, static_cast<Word>(empty.blocks.x),
+                             static_cast<Word>(empty.blocks.x * empty.blocks.y)};
+    alignas(64) Word place[kLanes], distances[kLanes];
+    auto least = hn::Set(d, most);
+    for (int r = 0; r < kRays; r += kLanes) {
+        const auto goes_on = hn::And(hn::Gt(hn::Load(d, pixels.active.v + r), zero),
+                                     hn::Gt(hn::Load(d, rays.slabs.v + r), hn::Set(d, k)));
+        hn::Vec<decltype(df)> p[3], low_side[3];  // where the ray is, and the lower face of its block there
+        auto index = zero;
+        auto beside = hn::Gt(zero, zero);  // a sample may lie in the next block
+        for (int a = 0; a < 3; ++a) {
+            p[a] = hn::MulAdd(hn::Set(df, float(k)), hn::Load(df, course.step[a].v + r),
+                              hn::Load(df, course.first[a].v + r));
+            p[a] = hn::Min(hn::Max(p[a], hn::Zero(df)), hn::Set(df, float(dims[a] - 1)));
+            const auto last = hn::Set(d, static_cast<Word>(counts[a] - 1));
+            const auto block = hn::Min(hn::ShiftRight<lanes::kBlockBits>(hn::ConvertTo(d, p[a])), last);
+            low_side[a] = hn::Mul(hn::ConvertTo(df, block), side);
+            const auto inside = hn::Sub(p[a], low_side[a]);
+            const auto near_low = hn::And(hn::RebindMask(d, hn::Lt(inside, margin)), hn::Gt(block, zero));
+            const auto near_high = hn::And(hn::RebindMask(d, hn::Gt(inside, inner_side)), hn::Lt(block, last));
+            beside = hn::Or(beside, hn::Or(near_low, near_high));
+            index = hn::Add(index, hn::Mul(block, hn::Set(d, strides[a])));
+        }
+        hn::Store(index, d, place);
+        for (int i = 0; i < kLanes; ++i) distances[i] = empty.distance[static_cast<std::size_t>(place[i])];
+        auto distance = hn::Load(d, distances);
+        distance = hn::Sub(distance, hn::IfThenElseZero(beside, one));
+        if (!hn::AllFalse(d, hn::And(goes_on, hn::Lt(distance, one)))) return 0;
+        // To the far side of the empty blocks ahead.
+        const auto empty_side = hn::Mul(hn::ConvertTo(df, distance), side);
+        auto steps = hn::Set(df, float(most));
+        for (int a = 0; a < 3; ++a) {
+            const auto up = hn::Sub(hn::Add(low_side[a], empty_side), p[a]);
+            const auto down = hn::Sub(p[a], hn::Sub(hn::Add(low_side[a], side), empty_side));
+            const auto backwards = hn::Lt(hn::Load(df, course.step[a].v + r), hn::Zero(df));
+            const auto way = hn::Sub(hn::IfThenElse(backwards, down, up), margin);
+            steps = hn::Min(steps, hn::Mul(way, hn::Load(df, course.pace[a].v + r)));
+        }
+        // The last sample inside is left out, too: the next one is looked at anew.
+        auto free = hn::Add(hn::ConvertTo(d, hn::Max(steps, hn::Zero(df))), one);
+        free = hn::Min(free, hn::Sub(hn::Load(d, course.skippable.v + r), hn::Set(d, k)));
+        least = hn::Min(least, hn::IfThenElse(goes_on, free, hn::Set(d, most)));
+    }
+    return std::max(0, hn::GetLane(hn::MinOfLanes(d, least)));
+}
+
+template <class T>
+void choose_voxel_kernels(bool cells, lanes::StageKernels& kernels) {
+    kernels.prefetch = cells ? &prefetch_cells<T> : &prefetch_linear<T>;
+    kernels.fetch = cells ? &fetch_cells<T> : &fetch_linear<T>;
+}
+
+}  // namespace
+
+void voxel_kernels_of(const VoxelSource& source, lanes::StageKernels& kernels) {
+    kernels.leave_out = &leave_out_empty;
+    if (source.volume->type == ScalarType::u8)
+        choose_voxel_kernels<std::uint8_t>(source.cells != nullptr, kernels);
+    else
+        choose_voxel_kernels<std::uint16_t>(source.cells != nullptr, kernels);
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace squint::lanes {
+void voxel_kernels(std::int64_t target, const VoxelSource& source, StageKernels& kernels) {
+    SQUINT_CALL_TARGET(target, voxel_kernels_of, source, kernels)
+}
+}  // namespace squint::lanes
+#endif
