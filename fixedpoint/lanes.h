@@ -111,8 +111,8 @@ template <class T, KnownRescales K>
 HWY_INLINE Lanes<T, K> absolute(Lanes<T, K> x) {
     return {hn::Max(x.v, hn::Sub(hn::Zero(hn::ScalableTag<T>()), x.v))};
 }
-/// One count for all lanes.  x86 shifts by a vector of counts in one instruction where it has one for the type,
-/// and by one count in two.
+/// One count for all lanes.  x86 shifts by a vector of counts in one instruction where it has one for the
+/// type, and by one count in two.
 template <class V>
 HWY_INLINE V shift_left_same(V v, int bits) {
 #if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2
@@ -156,7 +156,7 @@ HWY_INLINE Lanes<T, K> within(Lanes<T, K> x, std::int64_t, std::int64_t) {
 template <class T, KnownRescales K>
 HWY_INLINE Lanes<T, K> limit_in_lanes(std::int64_t limit) {
     return make_word(WordTag<Lanes<T, K>>{}, std::clamp<std::int64_t>(limit, std::numeric_limits<T>::min(),
-                                                                   std::numeric_limits<T>::max()));
+                                                                      std::numeric_limits<T>::max()));
 }
 
 /// quantise.h's formula.  What K does not tell is asked of `to`, in every vector.
@@ -167,9 +167,9 @@ HWY_INLINE Lanes<T, K> quantise(Lanes<T, K> x, const Rescale& to) {
     if constexpr (K == KnownRescales::halves_up) return {shift_right_same(biased(), to.shift)};
     if constexpr (K == KnownRescales::halves_to_even) {
         if (to.shift > 0)
-            x.v = shift_right_same(
-                hn::Add(biased(), hn::And(shift_right_same(x.v, to.shift), hn::Set(d, static_cast<T>(to.to_even)))),
-                to.shift);
+            x.v = shift_right_same(hn::Add(biased(), hn::And(shift_right_same(x.v, to.shift),
+                                                             hn::Set(d, static_cast<T>(to.to_even)))),
+                                   to.shift);
         return to.limits ? clamp(x, limit_in_lanes<T, K>(to.lowest), limit_in_lanes<T, K>(to.highest)) : x;
     }
     if (to.shift <= 0) {
@@ -205,7 +205,7 @@ template <KnownRescales K>
 HWY_INLINE Lanes<std::int64_t, K> gather(const Table& table, Lanes<std::int64_t, K> row, int column) {
     const hn::ScalableTag<std::int64_t> d;
     const Lanes<std::int64_t, K> index = row * make_word(WordTag<Lanes<std::int64_t, K>>{}, table.columns()) +
-                                      make_word(WordTag<Lanes<std::int64_t, K>>{}, column);
+                                         make_word(WordTag<Lanes<std::int64_t, K>>{}, column);
     return {hn::GatherIndex(d, table.words().data(), index.v)};
 }
 
@@ -296,8 +296,8 @@ HWY_INLINE auto blend_pairs(hn::Vec<hn::ScalableTag<std::int32_t>> pairs,
                             hn::Vec<hn::ScalableTag<std::int32_t>> weight, int weight_bits) {
     const hn::ScalableTag<std::int32_t> d;
 #if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR
-    // Highway's operation is x86's pairwise one here: one instruction for both products and their sum.  Its factors
-    // are signed: 2^15 is taken from both values, and given back to their mean.
+    // Highway's operation is x86's pairwise one here: one instruction for both products and their sum.  Its
+    // factors are signed: 2^15 is taken from both values, and given back to their mean.
     const hn::ScalableTag<std::int16_t> d16;
     const auto weights = hn::Or(hn::Sub(hn::Set(d, 1 << weight_bits), weight), hn::ShiftLeft<16>(weight));
     const auto centred = hn::Xor(pairs, hn::Set(d, static_cast<std::int32_t>(0x80008000)));
@@ -320,8 +320,10 @@ HWY_INLINE std::array<Lanes<T, K>, 4> blend_rows(const Table& table, Lanes<T, K>
             alignas(64) T at[HWY_LANES(T)];
             hn::Store(row.v, d, at);
             const auto pairs = load_quads([&](int lane) { return paired + std::int64_t{4} * at[lane]; });
-            return {L{blend_pairs(pairs[0], weight.v, weight_bits)}, L{blend_pairs(pairs[1], weight.v, weight_bits)},
-                    L{blend_pairs(pairs[2], weight.v, weight_bits)}, L{blend_pairs(pairs[3], weight.v, weight_bits)}};
+            return {L{blend_pairs(pairs[0], weight.v, weight_bits)},
+                    L{blend_pairs(pairs[1], weight.v, weight_bits)},
+                    L{blend_pairs(pairs[2], weight.v, weight_bits)},
+                    L{blend_pairs(pairs[3], weight.v, weight_bits)}};
         }
     const L next = row + make_word(WordTag<L>{}, 1);
     const auto between = [&](int c) {
@@ -332,8 +334,9 @@ HWY_INLINE std::array<Lanes<T, K>, 4> blend_rows(const Table& table, Lanes<T, K>
 
 /// Cells of 16-bit words are two 32-bit words, or one of 64 bits, with the first channel lowest.
 template <KnownRescales K>
-HWY_INLINE std::array<Lanes<std::int32_t, K>, 4> gather_cell(const CellTable& table, Lanes<std::int32_t, K> row,
-                                                          Lanes<std::int32_t, K> column) {
+HWY_INLINE std::array<Lanes<std::int32_t, K>, 4> gather_cell(const CellTable& table,
+                                                             Lanes<std::int32_t, K> row,
+                                                             Lanes<std::int32_t, K> column) {
     const hn::ScalableTag<std::int32_t> d;
     using L = Lanes<std::int32_t, K>;
     const auto cell = hn::Add(hn::Mul(row.v, hn::Set(d, table.size())), column.v);
@@ -352,8 +355,9 @@ HWY_INLINE std::array<Lanes<std::int32_t, K>, 4> gather_cell(const CellTable& ta
     return {at(0), at(1), at(2), at(3)};
 }
 template <KnownRescales K>
-HWY_INLINE std::array<Lanes<std::int64_t, K>, 4> gather_cell(const CellTable& table, Lanes<std::int64_t, K> row,
-                                                          Lanes<std::int64_t, K> column) {
+HWY_INLINE std::array<Lanes<std::int64_t, K>, 4> gather_cell(const CellTable& table,
+                                                             Lanes<std::int64_t, K> row,
+                                                             Lanes<std::int64_t, K> column) {
     const hn::ScalableTag<std::int64_t> d;
     const hn::RebindToUnsigned<decltype(d)> du;
     using L = Lanes<std::int64_t, K>;

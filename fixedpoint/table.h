@@ -36,9 +36,9 @@ class Table {
     const std::int32_t* narrow() const {
         return data_ && !data_->narrow.empty() ? data_->narrow.data() : nullptr;
     }
-    /// Of a table of four columns of unsigned 16-bit words: word c of row i in the low half, the same of row i + 1 in
-    /// the high half, at i * 4 + c.  One load for lanes that blend two rows.  Null where a word does not fit.  Made
-    /// by pair_rows(), once the table is built.
+    /// Of a table of four columns of unsigned 16-bit words: word c of row i in the low half, the same of row
+    /// i + 1 in the high half, at i * 4 + c.  One load for lanes that blend two rows.  Null where a word does
+    /// not fit.  Made by pair_rows(), once the table is built.
     const std::int32_t* paired() const {
         return data_ && !data_->paired.empty() ? data_->paired.data() : nullptr;
     }

@@ -27,7 +27,9 @@ struct Cell {
     std::array<W, 8> corner;
     W at(int i) const { return corner[static_cast<std::size_t>(i)]; }
     /// Corners 2 i and 2 i + 1 blended, exact.
-    W along_x(int i, W weight, int weight_bits) const { return blend(at(2 * i), at(2 * i + 1), weight, weight_bits); }
+    W along_x(int i, W weight, int weight_bits) const {
+        return blend(at(2 * i), at(2 * i + 1), weight, weight_bits);
+    }
 };
 
 }  // namespace squint
@@ -50,8 +52,8 @@ HWY_INLINE W lerp(W v0, W v1, W weight, int weight_bits, const Rescale& to) {
     return quantise(blend(v0, v1, weight, weight_bits), to);
 }
 
-/// Seven lerps: four along x, two along y, one along z.  Each level has a format of its own.  C: a Cell, however its
-/// corners are kept.
+/// Seven lerps: four along x, two along y, one along z.  Each level has a format of its own.  C: a Cell,
+/// however its corners are kept.
 template <class W, class C>
 HWY_INLINE W interpolate(const InterpolationStage& s, const C& cell, const std::array<W, 3>& weight) {
     if (s.nearest) {

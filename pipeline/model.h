@@ -12,7 +12,7 @@
 namespace squint {
 
 struct TileStatistics {
-    std::int64_t rays = 0, samples = 0, visited = 0;  // as RenderStatistics
+    std::int64_t rays = 0, samples = 0, visited = 0;            // as RenderStatistics
     std::unique_ptr<std::array<WireStatistics, kWires>> wires;  // with audit
 };
 

@@ -393,8 +393,9 @@ struct LeaveOutLimits {
 void leave_out_proven_limits(Plan& plan, const Slab<Range>& slab) {
     // A location is clamped to the box, and its format holds the box.
     if (!plan.location.to_location.wraps) plan.location.to_location.limits = false;
-    // Form w: w = q(alpha T) <= T for alpha <= 1, so T never falls below 0.  c w rounds to w at most for c <= 1, so
-    // C, a sum of such shares, never passes the sum of all w, which is 1 - T.  (Lit colours may pass 1.)
+    // Form w: w = q(alpha T) <= T for alpha <= 1, so T never falls below 0.  c w rounds to w at most for c <=
+    // 1, so C, a sum of such shares, never passes the sum of all w, which is 1 - T.  (Lit colours may
+    // pass 1.)
     CompositingStage& s = plan.compositing;
     const Format& color = plan.specs[Wire::color].format;
     const auto within_unit = [](const Range& x, int fraction) {
@@ -485,7 +486,6 @@ void choose_words(Plan& plan) {
     plan.word_bits = all.result_bits <= 63 ? 64 : 128;
     visit_stages(plan, LeaveOutLimits{Range::limited});
     leave_out_proven_limits(plan, slab);
-
 }
 
 void report_stages(Plan& plan) {

@@ -72,8 +72,10 @@ std::vector<std::int32_t> CellBlocks::slots() const {
 void CellBlocks::build(const std::function<bool(std::int64_t)>& wanted) {
     const std::lock_guard lock(mutex_);
     std::vector<std::int64_t> fresh;
-    for (std::size_t i = 0; i < slots_.size() && taken_ + static_cast<std::int64_t>(fresh.size()) < room_; ++i)
-        if (slots_[i] == kNotBuilt && wanted(static_cast<std::int64_t>(i))) fresh.push_back(static_cast<std::int64_t>(i));
+    for (std::size_t i = 0; i < slots_.size() && taken_ + static_cast<std::int64_t>(fresh.size()) < room_;
+         ++i)
+        if (slots_[i] == kNotBuilt && wanted(static_cast<std::int64_t>(i)))
+            fresh.push_back(static_cast<std::int64_t>(i));
     tbb::parallel_for(std::size_t{0}, fresh.size(), [&](std::size_t i) {
         const std::int64_t place = taken_ + static_cast<std::int64_t>(i);
         std::uint8_t* cells = data_ + place * block_bytes_;
@@ -100,9 +102,9 @@ void CellBlocks::fill(std::int64_t index, T* cells) const {
         for (std::int64_t j = 0; j < kSide; ++j) {
             const T* row[4];  // y fastest
             for (std::int64_t r = 0; r < 4; ++r)
-                row[r] = voxels + (std::min(low.z + k + r / 2, n.z - 1) * n.y +
-                                   std::min(low.y + j + r % 2, n.y - 1)) *
-                                      n.x;
+                row[r] =
+                    voxels +
+                    (std::min(low.z + k + r / 2, n.z - 1) * n.y + std::min(low.y + j + r % 2, n.y - 1)) * n.x;
             for (std::int64_t i = 0; i < kSide; ++i)
                 for (const T* line : row) *cells++ = line[x[i]], *cells++ = line[x[i + 1]];
         }

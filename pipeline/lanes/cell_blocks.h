@@ -28,7 +28,8 @@ class CellBlocks {
 
     /// Builds the blocks for which wanted(block) and that are not there yet, while there is room.
     void build(const std::function<bool(std::int64_t)>& wanted);
-    /// Where each block's cells lie, in cells from data(); -1 for one that is not there.  What is there stays.
+    /// Where each block's cells lie, in cells from data(); -1 for one that is not there.  What is there
+    /// stays.
     std::vector<std::int32_t> slots() const;
     /// Corners x fastest, in the volume's own type.
     const std::uint8_t* data() const { return data_; }

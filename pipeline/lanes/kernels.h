@@ -24,8 +24,8 @@ struct VoxelSource {
 struct StageKernels {
     /// Steps from slab k that every ray of the packet can leave out: all of them stay in blocks where nothing
     /// is to be seen.  At most `most`.
-    int (*leave_out)(const EmptySpace&, const RayCourse&, const RayPacket&, const PixelPacket&, const Index3& dims,
-                     int k, int most) = nullptr;
+    int (*leave_out)(const EmptySpace&, const RayCourse&, const RayPacket&, const PixelPacket&,
+                     const Index3& dims, int k, int most) = nullptr;
     /// Rows [from, to): cells, weights and slab lengths.
     void (*locate)(const Plan&, const RayPacket&, int from, int to, Samples&) = nullptr;
     /// Rows [from, to): where the voxels lie, and a request to memory for them.
@@ -36,6 +36,12 @@ struct StageKernels {
     void (*interpolate)(const Plan&, int from, int to, Samples&) = nullptr;
     /// Slabs [0, steps): inputs to colours and opacities.
     void (*classify)(const Plan&, int steps, Samples&) = nullptr;
+    /// Of slabs [0, steps): those in which something is to be seen by a ray that goes on, packed.  Gives
+    /// their number.
+    int (*gather_lit)(const Plan&, const RayPacket&, const PixelPacket&, int steps, const Samples&,
+                      LitSamples&) = nullptr;
+    /// The voxels about the first `count` gathered samples, as many as the gradient's rule wants.
+    void (*fetch_lit)(const Plan&, int count, LitSamples&) = nullptr;
     /// Colours of the first `count` gathered samples; reads and writes up to the next multiple of the lanes.
     void (*shade)(const Plan&, int count, LitSamples&) = nullptr;
     /// Slabs [0, steps) onto pixels; rays freeze where they end.

@@ -41,7 +41,8 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace squint::lanes {
-void classification_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels) {
+void classification_kernel(std::int64_t target, const Plan& plan, const StageWay& way,
+                           StageKernels& kernels) {
     SQUINT_CALL_TARGET(target, classification_kernel_of, plan, way, kernels)
 }
 }  // namespace squint::lanes

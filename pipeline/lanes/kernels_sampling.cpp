@@ -56,7 +56,8 @@ struct PackedCell {
     }
     L along_x(int i, L weight, int weight_bits) const {
         if constexpr (sizeof(typename L::Element) == 4)
-            if (weight_bits <= 14) return {blend_pairs(pair[static_cast<std::size_t>(i)].v, weight.v, weight_bits)};
+            if (weight_bits <= 14)
+                return {blend_pairs(pair[static_cast<std::size_t>(i)].v, weight.v, weight_bits)};
         return blend(at(2 * i), at(2 * i + 1), weight, weight_bits);
     }
 };
@@ -72,12 +73,12 @@ void interpolate_rows(const Plan& plan, int from, int to, lanes::Samples& sample
         const std::array<L, 3> weight{load<L>(samples.weight[0].v + at), load<L>(samples.weight[1].v + at),
                                       load<L>(samples.weight[2].v + at)};
         const L sample = interpolate(stage, cell, weight);
-        if constexpr (L::count() == I::count())
+        if constexpr (std::is_same_v<typename L::Element, typename I::Element>)
             store(classification_input(input, I{sample.v}), samples.input.v + at);
         else
             store(sample, samples.input.v + at);
     }
-    if constexpr (L::count() != I::count())
+    if constexpr (!std::is_same_v<typename L::Element, typename I::Element>)
         for (int at = from * kRays; at < to * kRays; at += static_cast<int>(I::count()))
             store(classification_input(input, load<I>(samples.input.v + at)), samples.input.v + at);
 }
@@ -85,8 +86,8 @@ void interpolate_rows(const Plan& plan, int from, int to, lanes::Samples& sample
 }  // namespace
 
 void sampling_kernels_of(const lanes::StageWays& ways, lanes::StageKernels& kernels) {
-    lanes::with_word<Lanes, KnownRescales::halves_up>(
-        ways.location, [&]<class L>() { kernels.locate = &locate_rows<L>; });
+    lanes::with_word<Lanes, KnownRescales::halves_up>(ways.location,
+                                                      [&]<class L>() { kernels.locate = &locate_rows<L>; });
     lanes::with_word<Lanes, KnownRescales::halves_up>(ways.interpolation, [&]<class L>() {
         if constexpr (sizeof(typename L::Element) == 8)
             kernels.interpolate = &interpolate_rows<L, L>;

@@ -1,5 +1,5 @@
-// Between stages 1 and 2: where samples' voxels lie, and their way into registers.  And what of a ray need not be
-// sampled at all.
+// Between stages 1 and 2: where samples' voxels lie, and their way into registers.  And what of a ray need
+// not be sampled at all.
 #include "pipeline/lanes/targets.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -45,7 +45,8 @@ HWY_INLINE Word pair_at(const std::uint8_t* voxels) {
     return (both & 0xff) | (both >> 8) << 16;
 }
 
-// ------------------------------------------------------------------------------------------------ the volume itself
+// ------------------------------------------------------------------------------------------------ the volume
+// itself
 
 template <class T>
 HWY_INLINE const T* corner_of(const Volume& volume, const Samples& s, int i) {
@@ -81,10 +82,12 @@ void prefetch_cells(const VoxelSource& source, int from, int to, Samples& s) {
     for (int at = from * kRays; at < to * kRays; at += kLanes) {
         const auto x = hn::Load(d, s.cell[0].v + at), y = hn::Load(d, s.cell[1].v + at),
                    z = hn::Load(d, s.cell[2].v + at);
-        const auto block = hn::Add(hn::ShiftRight<kBits>(x),
-                                   hn::Add(hn::Mul(row, hn::ShiftRight<kBits>(y)), hn::Mul(slice, hn::ShiftRight<kBits>(z))));
+        const auto block = hn::Add(
+            hn::ShiftRight<kBits>(x),
+            hn::Add(hn::Mul(row, hn::ShiftRight<kBits>(y)), hn::Mul(slice, hn::ShiftRight<kBits>(z))));
         const auto inside = [&](auto p) { return hn::And(p, in_block); };
-        const auto offset = hn::Or(inside(x), hn::Or(hn::ShiftLeft<kBits>(inside(y)), hn::ShiftLeft<2 * kBits>(inside(z))));
+        const auto offset =
+            hn::Or(inside(x), hn::Or(hn::ShiftLeft<kBits>(inside(y)), hn::ShiftLeft<2 * kBits>(inside(z))));
         const auto slot = hn::GatherIndex(d, source.slots.data(), block);
         hn::Store(hn::Or(slot, offset), d, s.place.v + at);  // -1 stays -1
     }
@@ -92,7 +95,8 @@ void prefetch_cells(const VoxelSource& source, int from, int to, Samples& s) {
     constexpr int kOutermost[] = {0, 3, 12, 15};
     for (int i = from * kRays; i < to * kRays; i += kRays)
         for (const int ray : kOutermost)
-            __builtin_prefetch(source.cells + std::int64_t{std::max(s.place.v[i + ray], 0)} * static_cast<std::int64_t>(8 * sizeof(T)));
+            __builtin_prefetch(source.cells + std::int64_t{std::max(s.place.v[i + ray], 0)} *
+                                                  static_cast<std::int64_t>(8 * sizeof(T)));
 }
 template <class T>
 void fetch_cells(const VoxelSource& source, int from, int to, Samples& s) {
@@ -102,7 +106,8 @@ void fetch_cells(const VoxelSource& source, int from, int to, Samples& s) {
     const auto spared = [&](int lane, int at) {  // a cell that is not there is put together here
         const T* corner = corner_of<T>(*source.volume, s, at + lane);
         for (int p = 0; p < 4; ++p)
-            spare[lane][2 * p] = corner[offsets.pair[p]], spare[lane][2 * p + 1] = corner[offsets.pair[p] + 1];
+            spare[lane][2 * p] = corner[offsets.pair[p]],
+                            spare[lane][2 * p + 1] = corner[offsets.pair[p] + 1];
         return reinterpret_cast<const std::uint8_t*>(spare[lane]);
     };
     const auto load = [](auto&& address) {
@@ -113,14 +118,120 @@ void fetch_cells(const VoxelSource& source, int from, int to, Samples& s) {
     };
     for (int at = from * kRays; at < to * kRays; at += kLanes) {
         const Word* place = s.place.v + at;
-        const auto there = [&](int lane) { return source.cells + std::int64_t{place[lane]} * static_cast<std::int64_t>(8 * sizeof(T)); };
+        const auto there = [&](int lane) {
+            return source.cells + std::int64_t{place[lane]} * static_cast<std::int64_t>(8 * sizeof(T));
+        };
         const bool all_there = hn::AllFalse(d, hn::Lt(hn::Load(d, place), hn::Zero(d)));
-        const auto pairs = all_there ? load(there) : load([&](int lane) { return place[lane] < 0 ? spared(lane, at) : there(lane); });
+        const auto pairs =
+            all_there ? load(there)
+                      : load([&](int lane) { return place[lane] < 0 ? spared(lane, at) : there(lane); });
         for (std::size_t p = 0; p < 4; ++p) store(Lanes<Word>{pairs[p]}, s.pair[p].v + at);
     }
 }
 
-// ------------------------------------------------------------------------------------------------ empty space
+// ------------------------------------------------------------------------------------------------ samples to
+// be lit
+
+int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, const lanes::PixelPacket& pixels,
+                       int steps, const Samples& s, lanes::LitSamples& lit) {
+    const hn::ScalableTag<Word> d;
+    const auto zero = hn::Zero(d);
+    const bool per_ray = plan.shading.half_per_ray || plan.shading.model == ShadingModel::phong;
+    int count = 0;
+    for (int at = 0; at < steps * kRays; at += kLanes) {
+        const int r = at % kRays;
+        const auto within = hn::Gt(hn::Load(d, rays.slabs.v + r), hn::Set(d, s.first + at / kRays));
+        const auto wanted = hn::And(hn::And(hn::Gt(hn::Load(d, s.alpha.v + at), zero), within),
+                                    hn::Gt(hn::Load(d, pixels.active.v + r), zero));
+        const auto many = hn::CountTrue(d, wanted);
+        if (many == 0) continue;
+        // Whole vectors are stored; what lies behind the last sample is written over by the next.
+        const auto pack = [&](const Word* from, lanes::Batch& to) {
+            hn::StoreU(hn::Compress(hn::Load(d, from), wanted), d, to.v + count);
+        };
+        hn::StoreU(hn::Compress(hn::Iota(d, at), wanted), d, lit.from.v + count);
+        for (int end = 0; end < (plan.needs_back ? 2 : 1); ++end)
+            for (int a = 0; a < 3; ++a) {
+                pack(s.cell[a].v + at + end * kRays, lit.cell[end][a]);
+                pack(s.weight[a].v + at + end * kRays, lit.weight[end][a]);
+            }
+        for (int c = 0; c < 3; ++c) pack(s.color[c].v + at, lit.color[c]);
+        pack(s.alpha.v + at, lit.alpha);
+        for (int a = 0; per_ray && a < 3; ++a) {
+            pack(rays.view[a].v + r, lit.view[a]);
+            for (int l = 0; l < plan.shading.lights; ++l) pack(rays.half[l][a].v + r, lit.half[l][a]);
+        }
+        count += static_cast<int>(many);
+    }
+    return count;
+}
+
+// Rows of four voxels a gradient wants, of the 4x4 about a cell: bit z * 4 + y.
+constexpr unsigned rows_of(GradientRule rule) {
+    return rule == GradientRule::analytic ? 0x0660U : rule == GradientRule::central ? 0x6ff6U : 0xffffU;
+}
+
+template <class T>
+void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
+    const Volume& volume = *plan.volume;
+    const hn::ScalableTag<Word> d;
+    const Index3 n = volume.dims;
+    const T* data = static_cast<const T*>(volume.data.get());
+    const unsigned rows = rows_of(plan.gradient.rule);
+    const auto clamped = [](std::int64_t i, std::int64_t end) {
+        return std::clamp<std::int64_t>(i, 0, end - 1);
+    };
+    for (int end = 0; end < (plan.needs_back ? 2 : 1); ++end)
+        for (int at = 0; at < count; at += kLanes) {
+            lanes::Batch* pair = lit.pair[end];
+            const auto& cell = lit.cell[end];
+            auto outside = hn::Lt(hn::Load(d, cell[0].v + at), hn::Set(d, 1));
+            for (int a = 0; a < 3; ++a) {
+                const auto p = hn::Load(d, cell[a].v + at);
+                outside = hn::Or(outside, hn::Or(hn::Lt(p, hn::Set(d, 1)),
+                                                 hn::Gt(p, hn::Set(d, static_cast<Word>(n[a] - 3)))));
+            }
+            const int here = std::min(kLanes, count - at);  // lanes behind the last sample repeat the first
+            outside = hn::And(outside, hn::FirstN(d, static_cast<std::size_t>(here)));
+            if (hn::AllFalse(d, outside)) {
+                const T* low[kLanes];
+                for (int lane = 0; lane < kLanes; ++lane) {
+                    const int i = lane < here ? at + lane : at;
+                    low[lane] = data + (cell[0].v[i] - 1) +
+                                n.x * ((cell[1].v[i] - 1) + n.y * std::int64_t{cell[2].v[i] - 1});
+                }
+                for (int row = 0; row < 16; ++row) {
+                    if (!(rows >> row & 1)) continue;
+                    const std::int64_t offset = n.x * (row % 4 + n.y * (row / 4));
+                    const auto address = [&](int lane) {
+                        return reinterpret_cast<const std::uint8_t*>(low[lane] + offset);
+                    };
+                    const auto words = [&] {
+                        if constexpr (sizeof(T) == 1)
+                            return load_widened_quads(address);
+                        else
+                            return load_quads(address);
+                    }();
+                    hn::Store(words[0], d, pair[2 * row].v + at),
+                        hn::Store(words[1], d, pair[2 * row + 1].v + at);
+                }
+                continue;
+            }
+            // Beside the volume's faces its outermost voxels go on.
+            for (int i = at; i < at + here; ++i)
+                for (int row = 0; row < 16; ++row) {
+                    if (!(rows >> row & 1)) continue;
+                    const T* line = data + n.x * (clamped(cell[1].v[i] + row % 4 - 1, n.y) +
+                                                  n.y * clamped(cell[2].v[i] + row / 4 - 1, n.z));
+                    const auto voxel = [&](int x) { return Word{line[clamped(cell[0].v[i] + x - 1, n.x)]}; };
+                    pair[2 * row].v[i] = voxel(0) | voxel(1) << 16,
+                             pair[2 * row + 1].v[i] = voxel(2) | voxel(3) << 16;
+                }
+        }
+}
+
+// ------------------------------------------------------------------------------------------------ empty
+// space
 
 int leave_out_empty(const lanes::EmptySpace& empty, const lanes::RayCourse& course,
                     const lanes::RayPacket& rays, const lanes::PixelPacket& pixels, const Index3& dims, int k,
@@ -150,7 +261,8 @@ int leave_out_empty(const lanes::EmptySpace& empty, const lanes::RayCourse& cour
             low_side[a] = hn::Mul(hn::ConvertTo(df, block), side);
             const auto inside = hn::Sub(p[a], low_side[a]);
             const auto near_low = hn::And(hn::RebindMask(d, hn::Lt(inside, margin)), hn::Gt(block, zero));
-            const auto near_high = hn::And(hn::RebindMask(d, hn::Gt(inside, inner_side)), hn::Lt(block, last));
+            const auto near_high =
+                hn::And(hn::RebindMask(d, hn::Gt(inside, inner_side)), hn::Lt(block, last));
             beside = hn::Or(beside, hn::Or(near_low, near_high));
             index = hn::Add(index, hn::Mul(block, hn::Set(d, strides[a])));
         }
@@ -181,12 +293,14 @@ template <class T>
 void choose_voxel_kernels(bool cells, lanes::StageKernels& kernels) {
     kernels.prefetch = cells ? &prefetch_cells<T> : &prefetch_linear<T>;
     kernels.fetch = cells ? &fetch_cells<T> : &fetch_linear<T>;
+    kernels.fetch_lit = &fetch_lit_samples<T>;
 }
 
 }  // namespace
 
 void voxel_kernels_of(const VoxelSource& source, lanes::StageKernels& kernels) {
     kernels.leave_out = &leave_out_empty;
+    kernels.gather_lit = &gather_lit_samples;
     if (source.volume->type == ScalarType::u8)
         choose_voxel_kernels<std::uint8_t>(source.cells != nullptr, kernels);
     else

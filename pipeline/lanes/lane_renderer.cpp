@@ -27,7 +27,9 @@ int bits_of(const WordNeeds& needs) {
 struct KnownOf {
     KnownRescales known = KnownRescales::halves_up;
     void operator()(const Rescale& to) {
-        while (!holds(known, to, 32)) known = known == KnownRescales::halves_up ? KnownRescales::halves_to_even : KnownRescales::nothing;
+        while (!holds(known, to, 32))
+            known =
+                known == KnownRescales::halves_up ? KnownRescales::halves_to_even : KnownRescales::nothing;
     }
     void operator()(const Table&) {}
     void operator()(const CellTable&) {}
@@ -78,43 +80,8 @@ void set_up_packet(const Plan& plan, int left, int top, int right, int bottom, P
     }
 }
 
-// ------------------------------------------------------------------------------------------------ voxels
-
-// The 4x4x4 voxels about a cell, or as many of them as a gradient wants, by pairs along x.
-template <class T>
-void fetch_neighbourhood_at(const Volume& volume, const Index3& cell, GradientRule rule, int at, Batch* pair) {
-    const T* data = static_cast<const T*>(volume.data.get());
-    const Index3 n = volume.dims;
-    const auto put = [&](int row, const auto& voxel) {
-        pair[2 * row].v[at] = voxel(0) | voxel(1) << 16, pair[2 * row + 1].v[at] = voxel(2) | voxel(3) << 16;
-    };
-    const auto wanted = [&](int y, int z) {
-        const bool y_inside = y == 1 || y == 2, z_inside = z == 1 || z == 2;
-        return rule == GradientRule::analytic  ? y_inside && z_inside
-               : rule == GradientRule::central ? y_inside || z_inside
-                                               : true;
-    };
-    const auto inside = [](std::int64_t i, std::int64_t count) { return i >= 1 && i + 2 < count; };
-    if (inside(cell.x, n.x) && inside(cell.y, n.y) && inside(cell.z, n.z)) {
-        const T* low = data + (cell.x - 1) + n.x * ((cell.y - 1) + n.y * (cell.z - 1));
-        for (int z = 0; z < 4; ++z)
-            for (int y = 0; y < 4; ++y)
-                if (wanted(y, z)) {
-                    const T* row = low + n.x * (y + n.y * z);
-                    put(z * 4 + y, [&](int x) { return Word{row[x]}; });
-                }
-        return;
-    }
-    const auto clamped = [](std::int64_t i, std::int64_t count) { return std::clamp<std::int64_t>(i, 0, count - 1); };
-    for (int z = 0; z < 4; ++z)
-        for (int y = 0; y < 4; ++y)
-            if (wanted(y, z)) {
-                const T* row = data + n.x * (clamped(cell.y + y - 1, n.y) + n.y * clamped(cell.z + z - 1, n.z));
-                put(z * 4 + y, [&](int x) { return Word{row[clamped(cell.x + x - 1, n.x)]}; });
-            }
-}
-
-// ------------------------------------------------------------------------------------------------ empty space
+// ------------------------------------------------------------------------------------------------ empty
+// space
 
 // About where the rays run, for leaving out empty space.
 void set_course(const Plan& plan, const EmptySpace& empty, const RayPacket& rays, RayCourse& course) {
@@ -131,8 +98,8 @@ void set_course(const Plan& plan, const EmptySpace& empty, const RayPacket& rays
             const float step = static_cast<float>(rays.step[a].v[r]) * step_unit;
             course.step[a].v[r] = step;
             course.pace[a].v[r] = step == 0 ? 1e30F : 1 / std::abs(step);
-            exit[a] = std::min<std::int64_t>((rays.last[a].v[r] >> plan.location.location_fraction) >> kBlockBits,
-                                             empty.blocks[a] - 1);
+            exit[a] = std::min<std::int64_t>(
+                (rays.last[a].v[r] >> plan.location.location_fraction) >> kBlockBits, empty.blocks[a] - 1);
         }
         // The ray's last sample stands at its exit, off P0 + kV by what rounding V adds up to.
         course.skippable.v[r] = empty.at(exit.x, exit.y, exit.z) > 0
@@ -192,9 +159,7 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
 }
 
 LaneRenderer::LaneRenderer(const Plan& plan, const RenderOptions& options)
-    : plan_(plan),
-      target_(find_target(options.target)),
-      ways_(ways_of(plan)) {
+    : plan_(plan), target_(find_target(options.target)), ways_(ways_of(plan)) {
     // A slab's two ends must lie in neighbouring blocks; its far one may be off by what V's rounding adds up
     // to.
     const double drift =
@@ -218,17 +183,22 @@ void LaneRenderer::choose_layout(const RenderOptions& options) {
     if (options.layout == LayoutRule::automatic) {
         // Cells pay where a block is met by many more samples than it takes voxels to build.
         const double samples = static_cast<double>(plan_.camera.width) * plan_.camera.height *
-                               static_cast<double>(std::max({volume.dims.x, volume.dims.y, volume.dims.z})) / plan_.scene.sampling.step;
+                               static_cast<double>(std::max({volume.dims.x, volume.dims.y, volume.dims.z})) /
+                               plan_.scene.sampling.step;
         if (samples < 8 * static_cast<double>(volume.voxels())) {
             layout_ = "linear: too few samples for cells to pay";
             return;
         }
     }
     cells_ = cell_blocks(volume, options.layout_bytes);
-    // Rays that leave out empty space still meet the blocks beside it.  Cells and empty space share their blocks.
+    // Rays that leave out empty space still meet the blocks beside it.  Cells and empty space share their
+    // blocks.
     static_assert(CellBlocks::kBits == kBlockBits);
-    cells_->build([&](std::int64_t block) { return !empty_ || empty_->distance[static_cast<std::size_t>(block)] <= 1; });
-    if (cells_->room() > 0) voxels_.cells = cells_->data(), voxels_.blocks = cells_->blocks(), voxels_.slots = cells_->slots();
+    cells_->build([&](std::int64_t block) {
+        return !empty_ || empty_->distance[static_cast<std::size_t>(block)] <= 1;
+    });
+    if (cells_->room() > 0)
+        voxels_.cells = cells_->data(), voxels_.blocks = cells_->blocks(), voxels_.slots = cells_->slots();
     layout_ = fmt::format("cells: 2x2x2 voxels side by side, {:.1f} MiB if all were met, room for {:.1f} MiB",
                           static_cast<double>(all) / 0x1p20, static_cast<double>(cells_->room()) / 0x1p20);
 }
@@ -238,12 +208,14 @@ std::string LaneRenderer::why() const {
         "lanes of {}/{}/{}/{} bits (location, interpolation, classification, compositing)",
         ways_.location.bits, ways_.interpolation.bits, ways_.classification.bits, ways_.compositing.bits);
     if (plan_.lit) text += fmt::format(", shading {}", ways_.shading.bits);
-    if (empty_) text += fmt::format("; {} of {} blocks visible", empty_->visible_blocks, empty_->distance.size());
+    if (empty_)
+        text += fmt::format("; {} of {} blocks visible", empty_->visible_blocks, empty_->distance.size());
     return text;
 }
 
 std::int64_t LaneRenderer::bytes() const {
-    return (empty_ ? static_cast<std::int64_t>(5 * empty_->distance.size()) : 0) + (cells_ ? cells_->bytes() : 0);
+    return (empty_ ? static_cast<std::int64_t>(5 * empty_->distance.size()) : 0) +
+           (cells_ ? cells_->bytes() : 0);
 }
 
 namespace {
@@ -260,8 +232,8 @@ struct Workspace {
 
 class PacketLoop {
   public:
-    PacketLoop(const Plan& plan, const StageKernels& kernels, const VoxelSource& voxels, const EmptySpace* empty,
-               Workspace& w)
+    PacketLoop(const Plan& plan, const StageKernels& kernels, const VoxelSource& voxels,
+               const EmptySpace* empty, Workspace& w)
         : plan_(plan),
           kernels_(kernels),
           voxels_(voxels),
@@ -378,42 +350,12 @@ class PacketLoop {
     void light(int steps) {
         Samples& s = here();
         LitSamples& lit = w_.lit;
-        int count = 0;
-        for (int at = 0; at < steps * kRays; ++at) {
-            const int r = at % kRays;
-            if (s.alpha.v[at] <= 0 || !w_.pixels.active.v[r] || s.first + at / kRays >= w_.rays.slabs.v[r])
-                continue;
-            gather_lit(at, r, count);
-            lit.from[static_cast<std::size_t>(count++)] = static_cast<std::int16_t>(at);
-        }
+        const int count = kernels_.gather_lit(plan_, w_.rays, w_.pixels, steps, s, lit);
         if (count == 0) return;
+        kernels_.fetch_lit(plan_, count, lit);
         kernels_.shade(plan_, count, lit);
         for (int i = 0; i < count; ++i)
-            for (int c = 0; c < 3; ++c)
-                s.color[c].v[lit.from[static_cast<std::size_t>(i)]] = lit.color[c].v[i];
-    }
-
-    void gather_lit(int at, int ray, int i) {
-        const Samples& s = here();
-        LitSamples& lit = w_.lit;
-        const Volume& volume = *plan_.volume;
-        for (int end = 0; end < (plan_.needs_back ? 2 : 1); ++end) {
-            const int here = at + end * kRays;
-            const Index3 cell(s.cell[0].v[here], s.cell[1].v[here], s.cell[2].v[here]);
-            for (int a = 0; a < 3; ++a) lit.weight[end][a].v[i] = s.weight[a].v[here];
-            if (volume.type == ScalarType::u8)
-                fetch_neighbourhood_at<std::uint8_t>(volume, cell, plan_.gradient.rule, i, lit.pair[end]);
-            else
-                fetch_neighbourhood_at<std::uint16_t>(volume, cell, plan_.gradient.rule, i, lit.pair[end]);
-        }
-        for (int c = 0; c < 3; ++c) lit.color[c].v[i] = s.color[c].v[at];
-        lit.alpha.v[i] = s.alpha.v[at];
-        if (plan_.shading.half_per_ray || plan_.shading.model == ShadingModel::phong)
-            for (int a = 0; a < 3; ++a) {
-                lit.view[a].v[i] = w_.rays.view[a].v[ray];
-                for (int l = 0; l < plan_.shading.lights; ++l)
-                    lit.half[l][a].v[i] = w_.rays.half[l][a].v[ray];
-            }
+            for (int c = 0; c < 3; ++c) s.color[c].v[lit.from.v[i]] = lit.color[c].v[i];
     }
 
     const Plan& plan_;

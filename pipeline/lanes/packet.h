@@ -44,18 +44,18 @@ struct alignas(64) RayCourse {
 struct alignas(64) Samples {
     Word first = 0;
     Batch cell[3], weight[3];
-    Batch place;                          // of the cell among the cells in memory, or below 0 (see VoxelSource)
-    Batch pair[4];                        // corners by pairs along x: the lower in the low half; y fastest
-    Batch input;                          // classification input
-    Batch length;                         // of the slab, in steps
-    Batch color[3], alpha;                // of the slab
+    Batch place;            // of the cell among the cells in memory, or below 0 (see VoxelSource)
+    Batch pair[4];          // corners by pairs along x: the lower in the low half; y fastest
+    Batch input;            // classification input
+    Batch length;           // of the slab, in steps
+    Batch color[3], alpha;  // of the slab
 };
 
 /// Samples to be lit, gathered from a batch: dense, so that transparent ones cost nothing.
 struct alignas(64) LitSamples {
-    std::array<std::int16_t, kBatch> from;  // place in the batch
-    Batch weight[2][3];                     // of the front sample, and of the back one where a slab has two
-    Batch pair[2][32];                      // the 4x4x4 voxels about its cell, by pairs along x
+    Batch from;                      // place in the batch
+    Batch cell[2][3], weight[2][3];  // of the front sample, and of the back one where a slab has two
+    Batch pair[2][32];               // the 4x4x4 voxels about its cell, by pairs along x
     Batch half[kMostHalves][3], view[3];
     Batch color[3], alpha;
 };

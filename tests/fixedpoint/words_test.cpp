@@ -119,7 +119,8 @@ TEST(Range, HoldsEveryResultOfEveryOperation) {
                 << n << " / " << d << " to " << to_string(spec);
             const auto part = [](std::int64_t x) { return x & 0x7fff; };
             const std::array<std::int64_t, 3> vector{part(n), part(d), part(n + d)};
-            const std::array<Range, 3> vectors{Range{0, vector[0] + 3}, Range{0, vector[1]}, Range{0, 0x7fff}};
+            const std::array<Range, 3> vectors{Range{0, vector[0] + 3}, Range{0, vector[1]},
+                                               Range{0, 0x7fff}};
             ASSERT_TRUE(holds(vector_length(vectors, bits % 11), vector_length(vector, bits % 11)));
             ASSERT_TRUE(holds(bit_length(p), bit_length(n)));
             ASSERT_TRUE(holds(shift_by(p, Range{-bits, bits}), shift_by(n, draw(-bits, bits))));

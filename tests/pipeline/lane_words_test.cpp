@@ -165,7 +165,9 @@ void compare_words(std::vector<std::string>& wrong) {
         const int guard = static_cast<int>(compare.between(0, 9));
         compare(
             "vector_length", [&](int) { return compare.between(0, 3) ? compare.any(15, false) : 0x7fff; },
-            [guard](auto x, auto y, auto z) { return vector_length(std::array{x, y, z}, guard); });
+            [guard](auto x, auto y, auto z) {
+                return vector_length(std::array{x, y, z}, guard);
+            });
     }
 }
 
