@@ -19,7 +19,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 // The hash of the picture below.  It changes only when a picture's meaning does (CONVENTIONS.md).
-constexpr const char* kSelfTestHash = "431af5288f26f832ad43437ae6e475f8";
+constexpr const char* kSelfTestHash = "edbdc4423ec9ae1e84e34f157f2772b9";
 
 /// A lit ball in a shell, 32x32 pixels of words, by one path.
 std::string self_test(Path path) {

@@ -139,11 +139,13 @@ Json render_frame(const Job& job, int frame) {
     const RenderArguments& a = job.arguments;
     const Plan plan = make_plan(job.scene, job.volume, frame);
     const RenderStatistics nothing;
-    refuse_beyond(a.max_memory, memory_of(plan, nothing).total(), "the scene");
+    const std::int64_t needed = memory_of(plan, nothing).total();
+    refuse_beyond(a.max_memory, needed, "the scene");
 
     std::optional<ProgressBar> bar(std::in_place, !a.quiet);
     RenderOptions options = a.options;
     options.cancelled = &interrupted;
+    if (a.max_memory > 0) options.layout_bytes = a.max_memory - needed;
     options.progress = [&](double part) { (*bar)(part); };
     Rendering rendering;
     Errors errors;

@@ -281,8 +281,8 @@ void plan_shading(Plan& plan) {
     const int slope_bits = settings.exponent == std::floor(settings.exponent)
                                ? 1
                                : std::min(21, 32 - bits_for(settings.exponent + 2));
-    s.parabola_slope = static_cast<std::int64_t>(
-        std::floor(std::ldexp((settings.exponent + 1) / 2, slope_bits) + 0.5));
+    s.parabola_slope =
+        static_cast<std::int64_t>(std::floor(std::ldexp((settings.exponent + 1) / 2, slope_bits) + 0.5));
     s.power_table_bits = std::min(10, s.power_fraction);
     if (settings.power == PowerRule::table) {
         // 1024 rows, linear between them: error p^2 / 8 / 2^20 for exponent p.
@@ -442,11 +442,11 @@ void choose_words(Plan& plan) {
     });
     plan.input_needs = needs_of([&] { input = classification_input(plan.input, sample); });
     std::array<Range, 3> normal{};
-    if (plan.lit)
-        needs[2] = needs_of([&] {
+    if (plan.lit) {
+        std::array<Range, 3> gradient;
+        plan.gradient_needs = needs_of([&] {
             Neighbourhood<Range> near;
             near.voxel.fill(voxel);
-            std::array<Range, 3> gradient;
             for (int axis = 0; axis < 3; ++axis) {
                 Range& g = gradient[static_cast<std::size_t>(axis)];
                 g = plan.gradient.rule == GradientRule::central_samples
@@ -455,8 +455,11 @@ void choose_words(Plan& plan) {
                 g = to_world(plan.gradient, g, axis);
                 if (plan.needs_back) g = g + g;
             }
-            normal = normalise(plan.gradient, gradient);
         });
+        plan.normal_needs = needs_of([&] { normal = normalise(plan.gradient, gradient); });
+        needs[2] = plan.gradient_needs;
+        needs[2].merge(plan.normal_needs);
+    }
     Slab<Range> slab;
     needs[3] = needs_of([&] {
         if (plan.scene.compositing.mode == CompositingMode::average && plan.projection_mode)

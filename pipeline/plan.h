@@ -59,7 +59,8 @@ struct Plan {
     Rescale to_average;             // average mode: sum of inputs over their number
     bool skips_empty_space = true;  // a transparent sample is the identity
 
-    WordNeeds input_needs;  // of a sample on its way to table entries, between stages 2 and 4
+    WordNeeds gradient_needs, normal_needs;  // of stage 3's two halves: up to the raw gradient, and normalising it
+    WordNeeds input_needs;                   // of a sample on its way to table entries, between stages 2 and 4
     int word_bits = 64;     // of the golden model: 64 or 128
     std::vector<StageReport> stages;
     std::vector<TableReport> tables;

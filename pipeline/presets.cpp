@@ -66,7 +66,7 @@ WireSpecs standard(const PresetInputs& in) {
     constexpr Rounding up = Rounding::rnd;
     const int scalar = in.scalar_bits, weight = scalar <= 12 ? 12 : 10;
     const int level = 31 - scalar - weight;  // fraction bits of a middle level: I + level + weight <= 31
-    const int gradient = level - 1;          // of a difference, which has a sign
+    const int gradient = 12;                 // weak gradients want them, and 64-bit lanes for the lerps alone
     const int sum = accumulating_bits(in);
     WireSpecs w{};
     w[Wire::location] = u(in.location_bits, clip(31 - in.location_bits), r);

@@ -47,7 +47,7 @@ StageKernels kernels_for(const Plan& plan, const StageWays& ways, const VoxelSou
     sampling_kernels(target, ways, kernels);
     voxel_kernels(target, source, kernels);
     classification_kernel(target, plan, ways.classification, kernels);
-    shading_kernel(target, ways.shading, kernels);
+    shading_kernel(target, ways, kernels);
     compositing_kernel(target, ways.compositing, kernels);
     return kernels;
 }

@@ -54,8 +54,9 @@ struct StageWay {
     KnownRescales known = KnownRescales::nothing;
 };
 struct StageWays {
-    StageWay location, interpolation, classification, shading, compositing;
-    StageWay input;  // from a sample to table entries: no narrower than interpolation
+    StageWay location, interpolation, classification, compositing;
+    StageWay gradient, shading;  // up to the raw gradient; normalising it, and what light does
+    StageWay input;              // from a sample to table entries: no narrower than interpolation
 };
 StageWays ways_of(const Plan& plan);
 
@@ -72,7 +73,7 @@ StageKernels kernels_for(const Plan& plan, const StageWays& ways, const VoxelSou
 void sampling_kernels(std::int64_t target, const StageWays& ways, StageKernels& kernels);
 void voxel_kernels(std::int64_t target, const VoxelSource& source, StageKernels& kernels);
 void classification_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);
-void shading_kernel(std::int64_t target, const StageWay& way, StageKernels& kernels);
+void shading_kernel(std::int64_t target, const StageWays& ways, StageKernels& kernels);
 void compositing_kernel(std::int64_t target, const StageWay& way, StageKernels& kernels);
 
 /// Calls f with the word for a way; `Known` is what a kernel is compiled to take for granted where it can.

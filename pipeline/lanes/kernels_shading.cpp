@@ -37,18 +37,27 @@ HWY_INLINE std::array<L, 3> stored_gradient(const GradientStage& s, const lanes:
     return gradient;
 }
 
-template <class L>
+/// G: the lanes of the raw gradient, whose lerps may need wider ones than all that follows.
+template <class G, class L>
 void shade_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
     const GradientStage stage = plan.gradient;
     const ShadingStage& shading = plan.shading;
     const bool per_ray = shading.half_per_ray || shading.model == ShadingModel::phong;
-    for (int at = 0; at < count; at += static_cast<int>(L::count())) {
-        std::array<L, 3> gradient = stored_gradient<L>(stage, lit, 0, at);
+    // To the end of the widest vector, which the second loop reads whole.
+    const int whole = (count + static_cast<int>(L::count()) - 1) / static_cast<int>(L::count()) *
+                      static_cast<int>(L::count());
+    for (int at = 0; at < whole; at += static_cast<int>(G::count())) {
+        std::array<G, 3> gradient = stored_gradient<G>(stage, lit, 0, at);
         if (plan.needs_back) {
-            const std::array<L, 3> other = stored_gradient<L>(stage, lit, 1, at);
+            const std::array<G, 3> other = stored_gradient<G>(stage, lit, 1, at);
             for (std::size_t a = 0; a < 3; ++a) gradient[a] = gradient[a] + other[a];
         }
-        const std::array<L, 3> normal = normalise(stage, gradient);
+        for (std::size_t a = 0; a < 3; ++a) store(gradient[a], lit.gradient[a].v + at);
+    }
+    for (int at = 0; at < count; at += static_cast<int>(L::count())) {
+        const std::array<L, 3> normal = normalise(
+            stage, std::array<L, 3>{load<L>(lit.gradient[0].v + at), load<L>(lit.gradient[1].v + at),
+                                    load<L>(lit.gradient[2].v + at)});
         RayWords<L> ray;
         if (per_ray)
             for (std::size_t a = 0; a < 3; ++a) {
@@ -65,9 +74,11 @@ void shade_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
 
 }  // namespace
 
-void shading_kernel_of(const lanes::StageWay& way, lanes::StageKernels& kernels) {
-    lanes::with_word<Lanes, KnownRescales::halves_to_even>(
-        way, [&]<class L>() { kernels.shade = &shade_samples<L>; });
+void shading_kernel_of(const lanes::StageWays& ways, lanes::StageKernels& kernels) {
+    lanes::with_word<Lanes, KnownRescales::halves_to_even>(ways.gradient, [&]<class G>() {
+        lanes::with_word<Lanes, KnownRescales::halves_to_even>(
+            ways.shading, [&]<class L>() { kernels.shade = &shade_samples<G, L>; });
+    });
 }
 
 }  // namespace squint::HWY_NAMESPACE
@@ -75,8 +86,8 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace squint::lanes {
-void shading_kernel(std::int64_t target, const StageWay& way, StageKernels& kernels) {
-    SQUINT_CALL_TARGET(target, shading_kernel_of, way, kernels)
+void shading_kernel(std::int64_t target, const StageWays& ways, StageKernels& kernels) {
+    SQUINT_CALL_TARGET(target, shading_kernel_of, ways, kernels)
 }
 }  // namespace squint::lanes
 #endif

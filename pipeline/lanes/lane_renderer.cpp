@@ -4,6 +4,7 @@
 #include "pipeline/raycast.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -108,6 +109,10 @@ void set_course(const Plan& plan, const EmptySpace& empty, const RayPacket& rays
     }
 }
 
+std::int64_t free_memory() {
+    return std::int64_t{sysconf(_SC_AVPHYS_PAGES)} * sysconf(_SC_PAGESIZE);
+}
+
 bool any_active(const PixelPacket& pixels) {
     return std::any_of(std::begin(pixels.active.v), std::end(pixels.active.v), [](Word a) { return a != 0; });
 }
@@ -123,7 +128,9 @@ StageWays ways_of(const Plan& plan) {
     ways.input = {bits_of(plan.input_needs), known_of(plan.input)};
     ways.interpolation = {bits(1), known_of(plan.interpolation)};
     ways.classification = {bits(3), std::visit([](const auto& m) { return known_of(m); }, plan.method)};
-    ways.shading = {std::max(bits(2), bits(4)), known_of(plan.gradient, plan.shading)};
+    const KnownRescales lit = known_of(plan.gradient, plan.shading);
+    ways.gradient = {bits_of(plan.gradient_needs), lit};
+    ways.shading = {std::max(bits_of(plan.normal_needs), bits(4)), lit};
     ways.compositing = {bits(5), known_of(plan.compositing)};
     return ways;
 }
@@ -190,7 +197,8 @@ void LaneRenderer::choose_layout(const RenderOptions& options) {
             return;
         }
     }
-    cells_ = cell_blocks(volume, options.layout_bytes);
+    const std::int64_t room = options.layout_bytes >= 0 ? options.layout_bytes : free_memory() / 2;
+    cells_ = cell_blocks(volume, room);
     // Rays that leave out empty space still meet the blocks beside it.  Cells and empty space share their
     // blocks.
     static_assert(CellBlocks::kBits == kBlockBits);
@@ -207,7 +215,7 @@ std::string LaneRenderer::why() const {
     std::string text = fmt::format(
         "lanes of {}/{}/{}/{} bits (location, interpolation, classification, compositing)",
         ways_.location.bits, ways_.interpolation.bits, ways_.classification.bits, ways_.compositing.bits);
-    if (plan_.lit) text += fmt::format(", shading {}", ways_.shading.bits);
+    if (plan_.lit) text += fmt::format(", gradients {}, shading {}", ways_.gradient.bits, ways_.shading.bits);
     if (empty_)
         text += fmt::format("; {} of {} blocks visible", empty_->visible_blocks, empty_->distance.size());
     return text;

@@ -57,6 +57,7 @@ struct alignas(64) LitSamples {
     Batch cell[2][3], weight[2][3];  // of the front sample, and of the back one where a slab has two
     Batch pair[2][32];               // the 4x4x4 voxels about its cell, by pairs along x
     Batch half[kMostHalves][3], view[3];
+    Batch gradient[3];  // raw; the sum of a slab's two ends
     Batch color[3], alpha;
 };
 
