@@ -1,0 +1,47 @@
+// Cells side by side against the volume as it lies: the same bits whatever there is room for.
+#include "pipeline/record.h"
+#include "pipeline/render.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace squint {
+namespace {
+
+/// A picture of a volume loaded for it alone, so that no other's cells are kept for it.
+Rendering rendered(const std::vector<std::string>& overrides, const RenderOptions& options) {
+    const Scene scene = scene_with(built_in_scene(), overrides);
+    return render(make_plan(scene, std::make_shared<Volume>(load_volume(volume_source(scene)))), options);
+}
+
+TEST(CellLayout, HasTheVolumesBitsWhateverRoomItHas) {
+    // 27 blocks of 8 x 8 x 8 cells of 16 bytes, the last ones cut by the volume's faces.
+    const std::vector<std::string> small{"volume.dims=[21, 18, 23]", "image.width=40", "image.height=36"};
+    constexpr std::int64_t kBlockBytes = 8192;
+    for (const char* shading : {"none", "blinn_phong"})
+        for (const char* method : {"pc", "pips"}) {
+            std::vector<std::string> overrides = small;
+            overrides.push_back(std::string("shading.model=") + shading);
+            overrides.push_back(std::string("classification.method=") + method);
+            RenderOptions options;
+            options.layout = LayoutRule::linear;
+            const std::string expected = picture_hash(rendered(overrides, options).image);
+            options.layout = LayoutRule::cells;
+            for (const std::int64_t room :
+                 {std::int64_t{0}, kBlockBytes, 5 * kBlockBytes + 17, 1000 * kBlockBytes})
+                for (const bool skip : {true, false}) {
+                    options.layout_bytes = room, options.skip = skip;
+                    const Rendering cells = rendered(overrides, options);
+                    EXPECT_EQ(picture_hash(cells.image), expected) << shading << ' ' << method << ' ' << room;
+                    EXPECT_EQ(cells.statistics.layout.substr(0, 5), "cells");
+                    // Beside the cells stand their table and that of the empty blocks.
+                    EXPECT_LE(cells.statistics.bytes, room + 27 * (4 + 5));
+                }
+        }
+}
+
+}  // namespace
+}  // namespace squint
