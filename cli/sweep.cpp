@@ -76,6 +76,8 @@ int run(const SweepArguments& a) {
                         text_of_time(s.seconds))
                 .c_str(),
             stderr);
+    if (!a.quiet && !s.first_failure.empty())
+        std::fputs(fmt::format("the first that failed: {}\n", s.first_failure).c_str(), stderr);
     return s.failed > 0 ? kSomeFailed : kDone;
 }
 

@@ -191,7 +191,8 @@ class Runner {
                                              timed ? threads_ : 1, timed);
             const std::lock_guard lock(mutex_);
             ++summary_.computed;
-            if (record["status"] == "failed") ++summary_.failed;
+            if (record["status"] == "failed" && summary_.failed++ == 0)
+                summary_.first_failure = record.value("reason", "");
             if (options_.finished) options_.finished(record);
             report({"points", summary_.computed, missing_.size(), summary_.failed, seconds_since(start)});
         });

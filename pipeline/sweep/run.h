@@ -39,6 +39,7 @@ struct RunSummary {
     std::size_t distinct = 0;  // different ones among them
     std::size_t reused = 0, computed = 0, failed = 0;
     std::size_t other_program = 0;  // reused, but made by another program than this
+    std::string first_failure;      // why the first point that failed did
     double seconds = 0;
 };
 
