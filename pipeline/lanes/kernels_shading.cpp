@@ -37,27 +37,41 @@ HWY_INLINE std::array<L, 3> stored_gradient(const GradientStage& s, const lanes:
     return gradient;
 }
 
-/// G: the lanes of the raw gradient, whose lerps may need wider ones than all that follows.
+/// The raw gradient of slabs: of their samples, or the sum of their two ends'.
+template <class G>
+HWY_INLINE std::array<G, 3> slab_gradient(const Plan& plan, const GradientStage& stage,
+                                          const lanes::LitSamples& lit, int at) {
+    std::array<G, 3> gradient = stored_gradient<G>(stage, lit, 0, at);
+    if (plan.needs_back) {
+        const std::array<G, 3> other = stored_gradient<G>(stage, lit, 1, at);
+        for (std::size_t a = 0; a < 3; ++a) gradient[a] = gradient[a] + other[a];
+    }
+    return gradient;
+}
+
+/// G: the lanes of the raw gradient, whose lerps may need wider ones than all that follows.  Where they
+/// differ it passes through 32-bit words, which hold whatever 32-bit lanes do.
 template <class G, class L>
 void shade_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
     const GradientStage stage = plan.gradient;
     const ShadingStage& shading = plan.shading;
     const bool per_ray = shading.half_per_ray || shading.model == ShadingModel::phong;
-    // To the end of the widest vector, which the second loop reads whole.
-    const int whole = (count + static_cast<int>(L::count()) - 1) / static_cast<int>(L::count()) *
-                      static_cast<int>(L::count());
-    for (int at = 0; at < whole; at += static_cast<int>(G::count())) {
-        std::array<G, 3> gradient = stored_gradient<G>(stage, lit, 0, at);
-        if (plan.needs_back) {
-            const std::array<G, 3> other = stored_gradient<G>(stage, lit, 1, at);
-            for (std::size_t a = 0; a < 3; ++a) gradient[a] = gradient[a] + other[a];
+    constexpr bool kAlike = std::is_same_v<G, L>;
+    if constexpr (!kAlike) {
+        // To the end of the widest vector, which the second loop reads whole.
+        constexpr int kStep = static_cast<int>(std::max(G::count(), L::count()));
+        for (int at = 0; at < (count + kStep - 1) / kStep * kStep; at += static_cast<int>(G::count())) {
+            const std::array<G, 3> gradient = slab_gradient<G>(plan, stage, lit, at);
+            for (std::size_t a = 0; a < 3; ++a) store(gradient[a], lit.gradient[a].v + at);
         }
-        for (std::size_t a = 0; a < 3; ++a) store(gradient[a], lit.gradient[a].v + at);
     }
     for (int at = 0; at < count; at += static_cast<int>(L::count())) {
-        const std::array<L, 3> normal = normalise(
-            stage, std::array<L, 3>{load<L>(lit.gradient[0].v + at), load<L>(lit.gradient[1].v + at),
-                                    load<L>(lit.gradient[2].v + at)});
+        std::array<L, 3> gradient;
+        if constexpr (kAlike)
+            gradient = slab_gradient<L>(plan, stage, lit, at);
+        else
+            for (std::size_t a = 0; a < 3; ++a) gradient[a] = load<L>(lit.gradient[a].v + at);
+        const std::array<L, 3> normal = normalise(stage, gradient);
         RayWords<L> ray;
         if (per_ray)
             for (std::size_t a = 0; a < 3; ++a) {
