@@ -1,4 +1,4 @@
-// Cells side by side against the volume as it lies: the same bits whatever there is room for.
+// The lanes' own ways through a picture against the plain ones: the same bits.
 #include "pipeline/record.h"
 #include "pipeline/render.h"
 
@@ -17,7 +17,7 @@ Rendering rendered(const std::vector<std::string>& overrides, const RenderOption
     return render(make_plan(scene, std::make_shared<Volume>(load_volume(volume_source(scene)))), options);
 }
 
-TEST(CellLayout, HasTheVolumesBitsWhateverRoomItHas) {
+TEST(LaneRenderer, TakesTheSameBitsFromCellsWhateverRoomTheyHave) {
     // 27 blocks of 8 x 8 x 8 cells of 16 bytes, the last ones cut by the volume's faces.
     const std::vector<std::string> small{"volume.dims=[21, 18, 23]", "image.width=40", "image.height=36"};
     constexpr std::int64_t kBlockBytes = 8192;
@@ -41,6 +41,24 @@ TEST(CellLayout, HasTheVolumesBitsWhateverRoomItHas) {
                     EXPECT_LE(cells.statistics.bytes, room + 27 * (4 + 5));
                 }
         }
+}
+
+// A difference of 12-bit voxels fits 32-bit lanes' factors, with 24 fraction bits it does not fit 32-bit
+// words.
+TEST(LaneRenderer, KeepsGradientsThatAreWiderThan32Bits) {
+    for (const char* method : {"pc", "pips"}) {
+        const std::vector<std::string> steep{"volume.procedural=shells",
+                                             "volume.dims=32",
+                                             "precision.gradient=s12.24",
+                                             std::string("classification.method=") + method,
+                                             "image.width=48",
+                                             "image.height=48"};
+        RenderOptions options;
+        options.path = Path::model;
+        const std::string expected = picture_hash(rendered(steep, options).image);
+        options.path = Path::lanes;
+        EXPECT_EQ(picture_hash(rendered(steep, options).image), expected) << method;
+    }
 }
 
 }  // namespace
