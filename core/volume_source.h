@@ -23,7 +23,6 @@ struct VolumeSource {
     int bits = 0;            // float data: bits to quantise the window to (required there, 1 to 16)
     double value_scale = 1;  // value = value_scale * stored + value_offset
     double value_offset = 0;
-    std::uint64_t seed = 1;  // procedural noise
 };
 
 struct LoadLimits {

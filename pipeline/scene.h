@@ -168,7 +168,6 @@ void visit_scene(S& scene, V&& visit) {
     visit("volume.bits", volume.bits, "float and procedural data: bits the values are quantised to");
     visit("volume.scale", volume.value_scale, "value = scale * stored + offset, in the file's units (HU)");
     visit("volume.value_offset", volume.value_offset, "see scale");
-    visit("volume.seed", volume.seed, "procedural noise");
     auto& tf = scene.transfer_function;
     visit("transfer_function.points", tf.points, "list of [value, r, g, b, alpha], values ascending");
     visit("transfer_function.color", tf.color, "list of [value, r, g, b]; with opacity, instead of points");

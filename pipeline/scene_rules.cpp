@@ -16,7 +16,6 @@ constexpr Limits kLimits[] = {
     {"volume.offset", 0},
     {"volume.spacing", 0, kNone, true},
     {"volume.bits", 0, 16},
-    {"volume.seed", 0},
     {"transfer_function.unit_distance", 0},
     {"transfer_function.entries", 2, 65536, false, false, 0},
     {"camera.azimuth", -36000, 36000},

@@ -170,7 +170,7 @@ TEST(SceneFile, RefusesNumbersOutOfRange) {
              {"volume.spacing=[1, -1, 1]", "one or three numbers above 0"},
              {"volume.window=[5, 5]", "two numbers, the first below the second"},
              {"volume.bits=17", "a whole number from 0 to 16"},
-             {"volume.seed=-1", "a whole number of 0 or more"},
+             {"volume.offset=-1", "a whole number of 0 or more"},
          }) {
         const std::string key(text, std::string_view(text).find('='));
         EXPECT_THAT(refusal("", {text}), testing::AllOf(StartsWith("--set " + key + ": found "),
@@ -357,9 +357,7 @@ class RandomScenes {
     template <class I>
     requires std::is_integral_v<I>
     void fill(std::string_view key, I& value) {
-        if (key == "volume.seed")
-            value = static_cast<I>(random_()) & 0x7fffffff;
-        else if (key == "classification.table_size")
+        if (key == "classification.table_size")
             value = static_cast<I>(whole(64, 4096));
         else
             value = static_cast<I>(whole(key == "transfer_function.entries" ? 2 : 1, 5));
