@@ -5,6 +5,7 @@
 #include <sys/mman.h>
 
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 
@@ -76,7 +77,7 @@ void CellBlocks::build(const std::function<bool(std::int64_t)>& wanted) {
          ++i)
         if (slots_[i] == kNotBuilt && wanted(static_cast<std::int64_t>(i)))
             fresh.push_back(static_cast<std::int64_t>(i));
-    tbb::parallel_for(std::size_t{0}, fresh.size(), [&](std::size_t i) {
+    const auto fill_block = [&](std::size_t i) {
         const std::int64_t place = taken_ + static_cast<std::int64_t>(i);
         std::uint8_t* cells = data_ + place * block_bytes_;
         if (volume_.type == ScalarType::u8)
@@ -84,7 +85,9 @@ void CellBlocks::build(const std::function<bool(std::int64_t)>& wanted) {
         else
             fill(fresh[i], reinterpret_cast<std::uint16_t*>(cells));
         slots_[static_cast<std::size_t>(fresh[i])] = static_cast<std::int32_t>(place * kCells);
-    });
+    };
+    // A thread that waits here must not take up work that asks for this lock.
+    tbb::this_task_arena::isolate([&] { tbb::parallel_for(std::size_t{0}, fresh.size(), fill_block); });
     taken_ += static_cast<std::int64_t>(fresh.size());
 }
 

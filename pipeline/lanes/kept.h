@@ -3,6 +3,8 @@
 
 #include "core/volume.h"
 
+#include <tbb/task_arena.h>
+
 #include <map>
 #include <memory>
 #include <mutex>
@@ -20,7 +22,9 @@ class KeptPerVolume {
         if (const auto found = kept_.find(volume.data.get());
             found != kept_.end() && found->second.dims == volume.dims && good(*found->second.thing))
             return found->second.thing;
-        const std::shared_ptr<T> thing = make();
+        // `make` may run in parallel; a thread that waits in it must not take up work that asks for this
+        // lock.
+        const std::shared_ptr<T> thing = tbb::this_task_arena::isolate(make);
         kept_[volume.data.get()] = {volume.data, volume.dims, thing};
         return thing;
     }
