@@ -1,6 +1,7 @@
 // Range reduction and Taylor series in double; pow carries its logarithm in two doubles.
 // Nothing here may be contracted to a fused multiply-add: the build says -ffp-contract=off.
 #include "core/portable_math.h"
+#include "core/portable_math_series.h"
 
 #include <array>
 #include <bit>
@@ -13,10 +14,6 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
-// ln 2 in two parts: the first has 42 bits, so that k times it is exact for |k| < 2^11.
-constexpr double kLn2High = 0x1.62e42fefa3800p-1;
-constexpr double kLn2Low = 0x1.ef35793c76730p-45;
 
 // pi/2 in four parts: the first three have 33 bits, so that k times each is exact for |k| < 2^20.
 constexpr double kHalfPi1 = 0x1.921fb54400000p+0;
@@ -109,14 +106,6 @@ double polynomial(const std::array<double, N>& coefficient, double x) {
     return even + x * odd;
 }
 
-/// 1/3!, 1/4!, ... 1/14!
-constexpr auto kFactorials = [] {
-    std::array<double, 12> coefficient{};
-    double factorial = 2;
-    for (int n = 0; n < 12; ++n) coefficient[n] = 1 / (factorial *= n + 3);  // factorials to 18! are exact
-    return coefficient;
-}();
-
 /// e^r - 1 for |r| <= 0.35: the first term left out is r^15 / 15!, below 2^-60 of r.
 double expm1_near_zero(double r) {
     return r + r * r * (0.5 + r * polynomial(kFactorials, r));
@@ -136,16 +125,6 @@ LogReduction reduce_log(double x) {
     if (m >= 0x1.6a09e667f3bcdp+0) m *= 0.5, ++k;
     return {k, m};
 }
-
-/// 1/(2 first + 1), 1/(2 first + 3), ...: atanh(s) = s (1 + z/3 + z^2/5 + ...) with z = s^2 <= 0.0295.
-template <std::size_t N>
-constexpr std::array<double, N> atanh_coefficients(int first) {
-    std::array<double, N> coefficient{};
-    for (std::size_t n = 0; n < N; ++n) coefficient[n] = 1.0 / static_cast<double>(2 * (first + n) + 1);
-    return coefficient;
-}
-constexpr auto kAtanhFrom1 = atanh_coefficients<10>(1);  // leaves z^11 / 23, below 2^-60
-constexpr auto kAtanhFrom2 = atanh_coefficients<12>(2);  // leaves z^14 / 29, below 2^-75
 
 /// ln x to about 2^-66 of itself: ln m = 2 s (1 + z/3 + z^2/5 + ...) with s = (m - 1) / (m + 1), z = s^2.
 Double2 log_twice(double x) {

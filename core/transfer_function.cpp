@@ -1,5 +1,6 @@
 #include "core/transfer_function.h"
 
+#include "core/curve_kernel.h"
 #include "core/error.h"
 #include "core/portable_math.h"
 
@@ -8,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <memory>
 
 namespace squint {
 namespace {
@@ -38,6 +40,43 @@ class Curve {
     Value Point::*part_;
     std::size_t after_ = 0;  // the first point whose value is greater
 };
+
+/// Curve's values at every sample, a stretch between two points at a time.
+template <class Point, class Part>
+void sample_curve(const std::vector<Point>& points, const SampleValues& values, const Part& part,
+                  std::span<double> result) {
+    const int count = static_cast<int>(result.size());
+    const bool ascending = values.scale > 0;
+    // The first sample that does not stand before `value` as samples run.
+    const auto first_at = [&](double value, int from) {
+        int low = from, high = count;
+        while (low < high) {
+            const int middle = low + (high - low) / 2;
+            const bool before = ascending ? values(middle) < value : values(middle) >= value;
+            (before ? low : high) = before ? middle + 1 : middle;
+        }
+        return low;
+    };
+    int done = 0;
+    const auto flat = [&](int end, double value) {
+        std::fill(result.begin() + done, result.begin() + std::max(done, end), value),
+            done = std::max(done, end);
+    };
+    const int last = static_cast<int>(points.size()) - 1;
+    const auto point = [&](int k) -> const Point& { return points[static_cast<std::size_t>(k)]; };
+    if (ascending)
+        flat(first_at(point(0).value, 0), part(point(0)));
+    else
+        flat(first_at(point(last).value, 0), part(point(last)));
+    for (int k = 0; k < last; ++k) {
+        const int at = ascending ? k : last - 1 - k;  // between points `at` and `at` + 1
+        const Point &a = point(at), &b = point(at + 1);
+        const int end = first_at(ascending ? b.value : a.value, done);
+        if (end > done)
+            sample_stretch(values, {a.value, b.value, part(a), part(b)}, done, end, result), done = end;
+    }
+    flat(count, part(ascending ? point(last) : point(0)));
+}
 
 bool in_unit_range(double x) {
     return x >= 0 && x <= 1;
@@ -104,18 +143,27 @@ Entries sample_entries(const TransferFunction& function, const Volume& volume) {
     Entries entries;
     entries.unit_distance = function.unit_distance;
     entries.scalars_per_entry = static_cast<double>(std::max<std::int64_t>(levels - 1, 1)) / (count - 1);
-    entries.entry.resize(static_cast<std::size_t>(count));
-    Curve color(function.color, &ColorPoint::color);
-    Curve alpha(function.opacity, &OpacityPoint::alpha);
-    for (int i = 0; i < count; ++i) {
-        Entry& entry = entries.entry[static_cast<std::size_t>(i)];
-        const double value = volume.value_scale * (i * entries.scalars_per_entry) + volume.value_offset;
-        entry.color = color(value);
-        entry.alpha = alpha(value);
-        entry.opaque = entry.alpha == 1;
-        const double capped = std::min(entry.alpha, kLargestTranslucentAlpha);
-        entry.extinction = (0 - portable::log1p(-capped)) / function.unit_distance;  // never a negative zero
-    }
+    const SampleValues values{volume.value_scale, entries.scalars_per_entry, volume.value_offset};
+    const auto size = static_cast<std::size_t>(count);
+    // Red, green, blue, alpha, -alpha capped.
+    const std::unique_ptr<double[]> sampled = std::make_unique_for_overwrite<double[]>(5 * size);
+    const auto column = [&](std::size_t c) { return std::span(sampled.get() + c * size, size); };
+    for (std::size_t c = 0; c < 3; ++c)
+        sample_curve(
+            function.color, values, [&](const ColorPoint& p) { return p.color[static_cast<int>(c)]; },
+            column(c));
+    sample_curve(
+        function.opacity, values, [](const OpacityPoint& p) { return p.alpha; }, column(3));
+    const std::span<double> red = column(0), green = column(1), blue = column(2), alpha = column(3),
+                            log = column(4);
+    for (std::size_t i = 0; i < size; ++i) log[i] = -std::min(alpha[i], kLargestTranslucentAlpha);
+    portable::log1p_each(log, log);
+    entries.entry.reserve(size);
+    for (std::size_t i = 0; i < size; ++i)
+        entries.entry.push_back({{red[i], green[i], blue[i]},
+                                 alpha[i],
+                                 (0 - log[i]) / function.unit_distance,  // never a negative zero
+                                 alpha[i] == 1});
     return entries;
 }
 

@@ -8,6 +8,7 @@
 #include <functional>
 #include <limits>
 #include <random>
+#include <vector>
 
 namespace {
 
@@ -163,6 +164,26 @@ std::uint64_t fingerprint(const std::function<double(Draws&)>& next) {
         for (int byte = 0; byte < 8; ++byte, bits >>= 8) hash = (hash ^ (bits & 255)) * 0x100000001b3u;
     }
     return hash;
+}
+
+// Whatever the vectors' length, and whatever stands beside a number: zeros, tiny, deep and huge ones among
+// the usual.
+TEST(PortableMath, ManyAtOnceHaveTheBitsOfEachAlone) {
+    Draws draw;
+    std::vector<double> x{0.0, -0.0, 1e-300, -0x1p-54, -0x1p-53, -1.0, 1.0, -40, 40, -40.5, 41, 800, -800};
+    for (int i = 0; i < 20000; ++i) x.push_back(draw.uniform(-1, i % 97 ? 0 : 1));
+    for (int i = 0; i < 20000; ++i) x.push_back(draw.uniform(i % 97 ? -40 : -800, i % 89 ? 0 : 800));
+    for (int i = 0; i < 1000; ++i) x.push_back(-draw.over_binades(-60, 0));
+    x.insert(x.end(), {-kInfinity, kInfinity, std::nan("")});
+    std::vector<double> exponentials(x.size()), logarithms(x.size());
+    squint::portable::expm1_each(x, exponentials), squint::portable::log1p_each(x, logarithms);
+    for (std::size_t i = 0; i < x.size(); ++i) {
+        const auto bits = [](double value) {
+            return std::isnan(value) ? 0 : std::bit_cast<std::uint64_t>(value);
+        };
+        ASSERT_EQ(bits(exponentials[i]), bits(expm1(x[i]))) << x[i];
+        ASSERT_EQ(bits(logarithms[i]), bits(log1p(x[i]))) << x[i];
+    }
 }
 
 // A compiler or CPU that differs in the last bit of one value in 100,000 changes these.

@@ -143,6 +143,26 @@ TEST(TransferFunction, WhatCannotBeSampledIsRefusedByName) {
     }
 }
 
+// A stretch between two points is sampled many entries at a time; a scale below zero runs through the points
+// backwards.
+TEST(TransferFunction, EntriesHaveTheBitsOfTheFunctionAtTheirValue) {
+    TransferFunction function = ramp();
+    function.color.push_back({100, {0.25, 0.75, 1}}), function.color.push_back({170.3, {0.1, 0.9, 0}});
+    function.opacity.insert(function.opacity.begin(), {{-30, 0.9}, {-30, 0.1}, {49.9, 1.0 / 3}});
+    for (const double scale : {1.0, 0.37, -0.71, 25.0})
+        for (const double offset : {0.0, -40.0, 100.0, 210.5}) {
+            Volume volume = volume_of_bits(8);
+            volume.value_scale = scale, volume.value_offset = offset;
+            const Entries entries = sample_entries(function, volume);
+            for (int i = 0; i < entries.size(); ++i) {
+                const Entry& entry = entries.entry[static_cast<std::size_t>(i)];
+                const double value = scale * i + offset;
+                ASSERT_EQ(entry.color, function.color_at(value)) << value;
+                ASSERT_EQ(entry.alpha, function.alpha_at(value)) << value;
+            }
+        }
+}
+
 TEST(TransferFunction, EveryMachineGetsTheseBits) {
     TransferFunction function = ramp();
     function.color = {{0, {0.1, 0.2, 0.3}}, {1000, {0.9, 0.1, 0.7}}, {4095, {0.3, 1, 0.2}}};

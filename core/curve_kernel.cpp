@@ -1,0 +1,53 @@
+#include "core/curve_kernel.h"
+
+#ifndef HWY_DISABLED_TARGETS  // vectors of SVE have no size: see pi2d_kernel.cpp
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
+#endif
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/curve_kernel.cpp"
+#include <hwy/foreach_target.h>
+
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace squint {
+namespace HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+void SampleStretch(const SampleValues& values, const CurveStretch& s, int first, int end, double* result) {
+    const hn::ScalableTag<double> d;
+    const auto from = hn::Set(d, s.from), width = hn::Set(d, s.to - s.from);
+    const auto before = hn::Set(d, s.before), rise = hn::Set(d, s.after - s.before);
+    const auto scale = hn::Set(d, values.scale), spacing = hn::Set(d, values.spacing),
+               offset = hn::Set(d, values.offset);
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    auto index = hn::Iota(d, static_cast<double>(first));
+    int i = first;
+    for (; i + lanes <= end; i += lanes, index = hn::Add(index, hn::Set(d, static_cast<double>(lanes)))) {
+        const auto value = hn::Add(hn::Mul(scale, hn::Mul(index, spacing)), offset);
+        const auto weight = hn::Div(hn::Sub(value, from), width);
+        hn::StoreU(hn::Add(before, hn::Mul(rise, weight)), d, result + i);
+    }
+    for (; i < end; ++i)
+        result[i] = s.before + (s.after - s.before) * ((values(i) - s.from) / (s.to - s.from));
+}
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace squint
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace squint {
+
+HWY_EXPORT(SampleStretch);
+
+void sample_stretch(const SampleValues& values, const CurveStretch& stretch, int first, int end,
+                    std::span<double> result) {
+    HWY_DYNAMIC_DISPATCH(SampleStretch)(values, stretch, first, end, result.data());
+}
+
+}  // namespace squint
+#endif

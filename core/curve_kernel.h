@@ -1,0 +1,26 @@
+// A control point's stretch of a curve, sampled at many entries at once.
+#pragma once
+
+#include <span>
+
+namespace squint {
+
+/// Sample i stands at value scale * (i * spacing) + offset.
+struct SampleValues {
+    double scale, spacing, offset;
+
+    double operator()(int i) const { return scale * (i * spacing) + offset; }
+};
+
+/// Two neighbouring control points: values, and what one of the curve's channels is there.
+struct CurveStretch {
+    double from, to;
+    double before, after;
+};
+
+/// result[i] = before + (after - before) (value - from) / (to - from) for first <= i < end, in these very
+/// operations: the bits of one sample at a time.
+void sample_stretch(const SampleValues& values, const CurveStretch& stretch, int first, int end,
+                    std::span<double> result);
+
+}  // namespace squint
