@@ -12,6 +12,7 @@
 #pragma once
 
 #include "pipeline/preintegration/linear_entries.h"
+#include "pipeline/preintegration/pi2d_kernel.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -95,8 +96,11 @@ void build_pi2d_words(const Entries& entries, int size, double length, std::span
         const auto pack = [&](auto&& values, std::size_t count, Cell* out) {
             for (int k = 0; k < 4; ++k)
                 encode(k, std::span(values(k), count), std::span(words + k * plane, count));
-            for (std::size_t f = 0; f < count; ++f)
-                out[f] = {{words[f], words[plane + f], words[2 * plane + f], words[3 * plane + f]}};
+            if constexpr (sizeof(Word) == 2)
+                interleave_4(words, plane, count, out->word);
+            else
+                for (std::size_t f = 0; f < count; ++f)
+                    out[f] = {{words[f], words[plane + f], words[2 * plane + f], words[3 * plane + f]}};
         };
         for (int lane = 0; lane < count; ++lane) {
             diagonal.solve(first + lane);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #ifndef HWY_DISABLED_TARGETS  // vectors of SVE have no size, and no structure can have them as members
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
@@ -189,12 +190,33 @@ void EncodeU16(const double* HWY_RESTRICT values, int count, int fraction_bits,
                unsigned short* HWY_RESTRICT words) {
     constexpr double kRound = 6755399441055744.0;
     const double scale = static_cast<double>(1 << fraction_bits);
-    for (int i = 0; i < count; ++i) {
+    const hn::Rebind<std::int32_t, Tag> whole;
+    const hn::Rebind<std::uint16_t, Tag> word;
+    int i = 0;
+    for (; i + static_cast<int>(hn::Lanes(kTag)) <= count; i += static_cast<int>(hn::Lanes(kTag))) {
+        const V scaled = hn::Mul(hn::LoadU(kTag, values + i), constant(scale));
+        const V limited = hn::Min(hn::Max(scaled, constant(0)), constant(65535));
+        const V rounded = hn::Sub(hn::Add(limited, constant(kRound)), constant(kRound));
+        hn::StoreU(hn::DemoteTo(word, hn::DemoteTo(whole, rounded)), word, words + i);
+    }
+    for (; i < count; ++i) {
         double scaled = values[i] * scale;
         scaled = scaled < 0 ? 0 : scaled;
         scaled = scaled > 65535 ? 65535 : scaled;
         words[i] = static_cast<unsigned short>(static_cast<int>((scaled + kRound) - kRound));
     }
+}
+
+void Interleave4(const unsigned short* HWY_RESTRICT planes, std::size_t plane, std::size_t count,
+                 unsigned short* HWY_RESTRICT cells) {
+    const hn::ScalableTag<std::uint16_t> d;
+    std::size_t i = 0;
+    for (; i + hn::Lanes(d) <= count; i += hn::Lanes(d))
+        hn::StoreInterleaved4(hn::LoadU(d, planes + i), hn::LoadU(d, planes + plane + i),
+                              hn::LoadU(d, planes + 2 * plane + i), hn::LoadU(d, planes + 3 * plane + i), d,
+                              cells + 4 * i);
+    for (; i < count; ++i)
+        for (std::size_t k = 0; k < 4; ++k) cells[4 * i + k] = planes[k * plane + i];
 }
 
 }  // namespace
@@ -209,6 +231,7 @@ HWY_EXPORT(SolveStretches);
 HWY_EXPORT(SlabOpacities);
 HWY_EXPORT(SubtractDropped);
 HWY_EXPORT(EncodeU16);
+HWY_EXPORT(Interleave4);
 
 void solve_stretches(const Stretches& stretches, double rate, double deepest) {
     HWY_DYNAMIC_DISPATCH(SolveStretches)(stretches, rate, deepest);
@@ -226,6 +249,10 @@ void subtract_dropped(const double* add, const double* transparency, const doubl
 
 void encode_u16(const double* values, int count, int fraction_bits, unsigned short* words) {
     HWY_DYNAMIC_DISPATCH(EncodeU16)(values, count, fraction_bits, words);
+}
+
+void interleave_4(const unsigned short* planes, std::size_t plane, std::size_t count, unsigned short* cells) {
+    HWY_DYNAMIC_DISPATCH(Interleave4)(planes, plane, count, cells);
 }
 
 }  // namespace squint::preintegration

@@ -3,9 +3,10 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 
-// Loops run over whole vectors: every array but encode_u16's has kPadding readable and writable values behind
-// its last one.
+// Loops run over whole vectors: every array of doubles but encode_u16's has kPadding readable and writable
+// values behind its last one.
 
 namespace squint::preintegration {
 
@@ -35,5 +36,8 @@ void subtract_dropped(const double* add, const double* transparency, const doubl
 
 /// words[i] = values[i] 2^fraction_bits to the nearest, ties to even, in [0, 65535].
 void encode_u16(const double* values, int count, int fraction_bits, unsigned short* words);
+
+/// cells[4 i + k] = planes[k plane + i], i < count.
+void interleave_4(const unsigned short* planes, std::size_t plane, std::size_t count, unsigned short* cells);
 
 }  // namespace squint::preintegration
