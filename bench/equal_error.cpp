@@ -1,11 +1,14 @@
 // Speed at equal error, the figure that counts: how long each method, and VTK where it was built, takes to
-// come within 40 and 50 dB (foreground PSNR) of the reference.  Each is run at ever smaller steps; between
-// two of them the time is interpolated, geometrically.  Progress on standard error, JSON on standard output;
-// bench/tables.py equal-error makes a table of it.
+// come within 40 and 50 dB (foreground PSNR) of the reference.  Each is run at ever smaller steps, and the
+// cheapest one that was measured and comes that near counts: nothing is interpolated.  Progress on standard
+// error, JSON on standard output; bench/tables.py equal-error makes a table of it, bench/plots.py plots.
 //
-//     bench_equal_error [scenes=phantom_128,cthead_translucent,...] [lit=0] [threads=1] [size=800] [every=8]
-//     [repeats=3]
-//                       [finest=0.03125]
+//     bench_equal_error [scenes=phantom_128,cthead_translucent,head,figure_5,...] [lit=0] [threads=1]
+//     [size=800]
+//                       [every=8] [repeats=3] [coarsest=4] [finest=0.03125] [all=0]
+//
+// Scenes: phantom_SIZE, those of configs/bench by name, figure_N of configs/lee_shin, and `head`, the
+// built-in one.  all=1: every step down to the finest, past 50 dB, too.
 #include "bench/support/support.h"
 #include "core/error.h"
 #ifdef SQUINT_HAS_VTK
@@ -14,7 +17,7 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
+#include <algorithm>
 #include <cstdio>
 #include <optional>
 
@@ -34,11 +37,15 @@ const std::vector<Contender>& contenders() {
 #ifdef SQUINT_HAS_VTK
         {"vtk", {}, true},
 #endif
-        {"pc", {}},
+        {"pc", {"classification.method=pc"}},
         {"pc_mid", {"classification.method=pc_mid"}},
         {"pi2d", {"classification.method=pi2d"}},
         {"pi1d", {"classification.method=pi1d"}},
-        {"pips", {"classification.method=pips"}},
+        {"pi1d_engel", {"classification.method=pi1d_engel"}},
+        {"pips_1", {"classification.method=pips", "classification.order=1"}},
+        {"pips_3", {"classification.method=pips", "classification.order=3"}},
+        {"leg_2", {"classification.method=leg", "classification.order=2"}},
+        {"leg_3", {"classification.method=leg", "classification.order=3"}},
     };
     return all;
 }
@@ -85,25 +92,25 @@ Shot shoot(const Contender& contender, const Plan& plan, int threads, int repeat
     });
 }
 
-/// Where the error first falls to `psnr` going from coarse to fine; none when it never does.
+/// The least time of those that come within `psnr`; none where none does.
 std::optional<double> ms_at(const std::vector<Point>& points, double psnr, double Point::*time) {
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        if (points[i].psnr < psnr) continue;
-        if (i == 0) return points[0].*time;  // the coarsest step will do
-        const Point &coarse = points[i - 1], &fine = points[i];
-        const double part = (psnr - coarse.psnr) / (fine.psnr - coarse.psnr);
-        return std::exp(std::log(coarse.*time) + part * (std::log(fine.*time) - std::log(coarse.*time)));
-    }
-    return {};
+    std::optional<double> least;
+    for (const Point& point : points)
+        if (point.psnr >= psnr) least = std::min(least.value_or(point.*time), point.*time);
+    return least;
 }
 
 Json or_null(const std::optional<double>& value) {
     return value ? Json(*value) : Json();
 }
 
-Scene scene_of(const std::string& name, bool lit, const std::vector<std::string>& overrides) {
-    return name.starts_with("phantom_") ? phantom_scene(std::stoll(name.substr(8)), lit, overrides)
-                                        : data_scene(name, lit, overrides);
+Scene scene_of(const std::string& name, bool lit, std::vector<std::string> overrides) {
+    if (name.starts_with("phantom_")) return phantom_scene(std::stoll(name.substr(8)), lit, overrides);
+    if (!name.starts_with("figure_") && name != "head") return data_scene(name, lit, overrides);
+    if (!lit) overrides.push_back("shading.model=none");
+    return name == "head"
+               ? scene_with(built_in_scene(), overrides)
+               : read_scene(fmt::format("{}/configs/lee_shin/{}.toml", SQUINT_SOURCE_DIR, name), overrides);
 }
 
 Json run(const std::string& name, bool lit, const Contender& contender, const Settings& settings) {
@@ -111,7 +118,7 @@ Json run(const std::string& name, bool lit, const Contender& contender, const Se
     std::vector<Point> points;
     Json list = Json::array();
     // Past 50 dB there is nothing left to find; an error that grows again (VTK's) ends the search too.
-    for (double step = 4; step >= settings.number("finest"); step /= 2) {
+    for (double step = settings.number("coarsest"); step >= settings.number("finest"); step /= 2) {
         std::vector<std::string> overrides = contender.overrides;
         overrides.push_back(fmt::format("sampling.step={}", step));
         for (const char* side : {"width", "height"})
@@ -128,6 +135,7 @@ Json run(const std::string& name, bool lit, const Contender& contender, const Se
                                lit ? "lit" : "unlit", contender.name, step, p.ms, p.psnr, load())
                        .c_str(),
                    stderr);
+        if (settings.number("all") != 0) continue;
         if (p.psnr >= 50) break;
         if (points.size() >= 3 && p.psnr < points[points.size() - 2].psnr - 1) break;
     }
@@ -152,7 +160,9 @@ int main(int argc, char** argv) try {
          {"size", "800"},
          {"every", "8"},
          {"repeats", "3"},
-         {"finest", "0.03125"}});
+         {"coarsest", "4"},
+         {"finest", "0.03125"},
+         {"all", "0"}});
     print_line({{"machine", machine()}});
     for (const std::string& name : settings.list("scenes"))
         for (const double lit : settings.numbers("lit")) {
