@@ -12,6 +12,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <utility>
 
 namespace squint::cli {
 
@@ -50,11 +51,38 @@ std::shared_ptr<const Volume> load(const Scene& scene, std::vector<std::string>&
     return std::make_shared<const Volume>(load_volume(volume_source(scene), limits, &notes));
 }
 
+namespace {
+/// The setting that a plan's message is about: the one it begins with, or, of a section, the first that it
+/// names.  Empty where none was given.
+std::string setting_meant(const Scene& scene, const std::string& key, const std::string& message) {
+    if (scene.given_at.contains(key)) return key;
+    std::string meant;
+    std::size_t first = std::string::npos;
+    for (const auto& [given, place] : scene.given_at) {
+        if (!given.starts_with(key + '.')) continue;
+        const std::size_t at = message.find(' ' + given.substr(key.size() + 1) + ' ');
+        if (at < first) first = at, meant = given;
+    }
+    return meant;
+}
+}  // namespace
+
+Plan plan_of(const Scene& scene, std::shared_ptr<const Volume> volume, int frame) {
+    try {
+        return make_plan(scene, std::move(volume), frame);
+    } catch (const InputError& error) {
+        const std::string message = error.what(), key = message.substr(0, message.find(':'));
+        const auto given = setting_meant(scene, key, message);
+        if (given.empty()) throw;
+        throw InputError(where(scene, given) + message.substr(key.size()));
+    }
+}
+
 Plan plan_of(const SceneArguments& arguments) {
     const Scene scene = read(arguments);
     std::vector<std::string> notes;
     const auto volume = load(scene, notes);
-    Plan plan = make_plan(scene, volume);
+    Plan plan = plan_of(scene, volume);
     plan.notes.insert(plan.notes.begin(), notes.begin(), notes.end());
     return plan;
 }

@@ -32,6 +32,9 @@ Scene scene_of_volume(const std::string& name_or_file, const std::vector<std::st
 std::shared_ptr<const Volume> load(const Scene& scene, std::vector<std::string>& notes,
                                    std::int64_t max_bytes = 0);
 
+/// make_plan(), whose messages begin with the place where the setting was given that they are about.
+Plan plan_of(const Scene& scene, std::shared_ptr<const Volume> volume, int frame = 0);
+
 /// Scene, volume and plan in one step; the volume's notes stand before the plan's own.
 Plan plan_of(const SceneArguments& arguments);
 

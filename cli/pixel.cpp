@@ -70,6 +70,7 @@ Json json_of_trace(const Plan& plan, const PixelArguments& a, const RayTrace& tr
             {"version", version()},
             {"column", a.column},
             {"row", a.row},
+            {"real", plan.real},
             {"slabs", s.slabs},
             {"last_length", s.last_length},
             {"first_voxel", {s.first.x, s.first.y, s.first.z}},

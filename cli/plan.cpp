@@ -73,10 +73,12 @@ const StageReport& stage_of(const Plan& plan, std::string_view name) {
 std::string stages_text(const Plan& plan) {
     Rows rows{{"stage", "", "widest operand", "widest result", "word", ""}};
     for (const StageReport& s : plan.stages) {
-        if (s.modelled)
-            rows.push_back({s.name, plan.real ? "in double" : "modelled",
-                            std::to_string(s.needs.operand_bits), std::to_string(s.needs.result_bits),
-                            std::to_string(word_of(s.needs.result_bits)), s.why});
+        if (s.modelled && plan.real)
+            rows.push_back({s.name, "in double", "-", "-", "-", s.why});
+        else if (s.modelled)
+            rows.push_back({s.name, "modelled", std::to_string(s.needs.operand_bits),
+                            std::to_string(s.needs.result_bits), std::to_string(word_of(s.needs.result_bits)),
+                            s.why});
         else
             rows.push_back({s.name, "left out", "-", "-", "-", s.why});
     }
@@ -130,7 +132,7 @@ Json json_of_plan(const Plan& plan) {
     Json stages = Json::array(), tables = Json::array();
     for (const StageReport& s : plan.stages) {
         stages.push_back({{"name", s.name}, {"modelled", s.modelled}, {"why", s.why}});
-        if (s.modelled)
+        if (s.modelled && !plan.real)
             stages.back().update({{"operand_bits", s.needs.operand_bits},
                                   {"result_bits", s.needs.result_bits},
                                   {"word_bits", word_of(s.needs.result_bits)}});
@@ -146,7 +148,7 @@ Json json_of_plan(const Plan& plan) {
             {"scene", json_of_scene(plan.scene)},
             {"volume", json_of(*plan.volume)},
             {"real", plan.real},
-            {"model_word_bits", plan.word_bits},
+            {"model_word_bits", plan.real ? Json(nullptr) : Json(plan.word_bits)},
             {"skips_empty_space", plan.skips_empty_space},
             {"stages", stages},
             {"wires", json_of_wires(plan)},

@@ -137,7 +137,7 @@ struct Job {
 /// Renders, writes and reports one picture; returns its record.
 Json render_frame(const Job& job, int frame) {
     const RenderArguments& a = job.arguments;
-    const Plan plan = make_plan(job.scene, job.volume, frame);
+    const Plan plan = plan_of(job.scene, job.volume, frame);
     const RenderStatistics nothing;
     const std::int64_t needed = memory_of(plan, nothing).total();
     refuse_beyond(a.max_memory, needed, "the scene");
@@ -226,6 +226,7 @@ int run(const RenderArguments& a) {
                 {"version", version()},
                 {"scene", json_of_scene(scene)},
                 {"volume", json_of(*job.volume)},
+                {"real", scene.precision.preset == "real"},
                 {"wires", pictures[0]["wires"]},
                 {"warnings", pictures[0]["warnings"]},
                 {"notes", notes},

@@ -193,6 +193,10 @@ Json json_of_wires(const Plan& plan) {
     for (int w = 0; w < kWires; ++w) {
         const auto wire = static_cast<Wire>(w);
         const Spec& spec = plan.specs[wire];
+        if (plan.real) {
+            json[std::string(info(wire).name)] = {{"stage", info(wire).stage}, {"format", "real"}};
+            continue;
+        }
         json[std::string(info(wire).name)] = {{"stage", info(wire).stage},
                                               {"format", to_string(spec.format)},
                                               {"rounding", to_string(spec.rounding)},

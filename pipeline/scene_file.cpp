@@ -331,6 +331,10 @@ void check_transfer_function(const Scene& scene) {
     constexpr std::string_view kOne = "exactly one of points, color with opacity, preset, file";
     if (given.size() > 1)
         refuse(scene, "transfer_function", fmt::format("{} and {}", given[0], given[1]), kOne);
+    for (const std::string_view list : {"points", "color", "opacity"})
+        if (const std::string key = fmt::format("transfer_function.{}", list);
+            given.empty() && scene.given_at.contains(key))
+            refuse(scene, key, "an empty list", kOne);
     if (given.empty()) refuse(scene, "transfer_function", "none", kOne);
     if (tf.color.empty() != tf.opacity.empty())
         refuse(scene, tf.color.empty() ? "transfer_function.opacity" : "transfer_function.color",

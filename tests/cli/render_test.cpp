@@ -194,6 +194,26 @@ TEST_F(Render, MistakesOnTheCommandLineAreOneLine) {
     EXPECT_THAT(files(), ElementsAre());
 }
 
+TEST_F(Render, WhatOnlySeveralSettingsShowIsRefusedWhereOneOfThemStands) {
+    const std::string volume = "[volume]\nprocedural = 'sphere'\ndims = 16\n",
+                      function = "[transfer_function]\nunit_distance = 1\npoints = [[0, 1, 1, 1, 0.5]]\n";
+    const auto refusal = [&](const std::string& rest, const std::string& part) {
+        write("s.toml", rest);
+        expect_refusal(squint("render s.toml --size 8x8"), "squint: s.toml:" + part);
+    };
+    refusal(volume + function + "[camera]\neye = [1, 2, 3]\ncenter = [1, 2, 3]\n",
+            "8:7: camera.eye: eye and center are both");
+    refusal(volume + function + "[camera]\neye = [8, 8, -9]\ncenter = [8, 8, 8]\nup = [0, 0, 1]\n",
+            "10:6: camera.up: up [0, 0, 1] is parallel");
+    refusal(volume + function + "[precision]\nsample = 'u3.8'\n", "8:10: precision.sample: u3.8");
+    refusal(volume + function + "[[lights]]\nheadlight = true\n[shading]\nexponent = 3\n",
+            "10:12: shading.exponent: 3");
+    refusal(volume + "[transfer_function]\nunit_distance = 1\npoints = []\n",
+            "6:10: transfer_function.points: found an empty list");
+    expect_refusal(squint("render --size 8x8 --set precision.sample=u3.8"), "--set precision.sample: u3.8");
+    EXPECT_THAT(files(), ElementsAre("s.toml"));
+}
+
 TEST_F(Render, OutputsThatCannotBeAreRefusedBeforeTheWork) {
     const std::string slow = "render --size 4000x4000 --set sampling.step=0.01 ";
     expect_refusal(squint(slow + "-o no/such/a.exr"), "no folder no/such");

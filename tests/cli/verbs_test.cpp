@@ -10,6 +10,7 @@ namespace squint {
 namespace {
 
 using namespace test;
+using ::testing::ContainsRegex;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -63,6 +64,19 @@ TEST_F(Verbs, PlanAsJsonNamesEveryWireWithItsFormat) {
     EXPECT_EQ(plan["wires"]["color"]["format"], "u1.9");
     EXPECT_EQ(plan["wires"]["color"]["rounding"], "trn");
     EXPECT_GT(plan["memory"]["table_bytes"], 0);
+}
+
+TEST_F(Verbs, WiresOfThePresetRealHaveNoFormat) {
+    for (const char* verb : {"plan --json", "render --json - -q", "pixel 12 8 --json"}) {
+        const auto record = squint(verb + kSmall + "--set precision.preset=real").json();
+        EXPECT_EQ(record["real"], true) << verb;
+        EXPECT_EQ(squint(verb + kSmall).json()["real"], false) << verb;
+        if (!record.contains("wires")) continue;
+        EXPECT_EQ(record["wires"]["color"]["format"], "real") << verb;
+        EXPECT_FALSE(record["wires"]["color"].contains("rounding")) << verb;
+    }
+    EXPECT_THAT(squint("plan --set precision.preset=real" + kSmall).out,
+                Not(ContainsRegex("[0-9]+ +[0-9]+ +64")));
 }
 
 TEST_F(Verbs, PixelShowsTheWiresThatLeadToThePicture) {

@@ -135,6 +135,29 @@ TEST(Compositing, BelowOneHalfRoundingStallsOnThinFog) {
     EXPECT_NEAR(lsb8(20, Rounding::trn), -0.13, 0.005);
 }
 
+// C6.3: each of N samples rounds T by up to half a last bit, and no later one makes that larger, so N
+// 2^-(F+1) bounds the error, half an LSB8 at F = 8 + log2 N; a stall comes near it, so that one bit less does
+// not do.
+TEST(Compositing, HalfAStepOfADisplayTakesEightBitsAndTheLogarithmOfTheSamples) {
+    const auto worst_lsb8 = [](int bits, int samples) {
+        const CompositingStage s = stage_of(equation_9, bits, Rounding::rnd);
+        double worst = 0;
+        for (Word alpha = 1; alpha <= 64; ++alpha)
+            for (const double part : {0.1, 0.25, 0.49, 0.499, 0.75, 0.9, 1.0}) {
+                const auto start = static_cast<Word>(std::floor(part * std::ldexp(1.0, bits)));
+                const double exact = static_cast<double>(start) *
+                                     std::pow(1 - std::ldexp(static_cast<double>(alpha), -bits), samples);
+                const auto left = static_cast<double>(transparency_behind(s, samples, alpha, start));
+                worst = std::max(worst, 255 * std::ldexp(std::fabs(left - exact), -bits));
+            }
+        return worst;
+    };
+    for (const int p : {4, 6, 8, 10}) {
+        EXPECT_LE(worst_lsb8(8 + p, 1 << p), 0.5) << p;
+        EXPECT_GT(worst_lsb8(7 + p, 1 << p), 0.5) << p;
+    }
+}
+
 struct Ray {
     std::vector<Word> color, alpha;  // premultiplied, C <= alpha, u1.15
 };
