@@ -13,6 +13,7 @@
 #endif
 
 #include "fixedpoint/cell_table.h"
+#include "fixedpoint/unrolled.h"
 #include "fixedpoint/words.h"
 
 #include <hwy/highway.h>
@@ -31,6 +32,7 @@ struct Lanes {
     using Element = T;
     using D = hn::ScalableTag<T>;
     using V = hn::Vec<D>;
+    static constexpr KnownRescales kKnown = K;
     V v;
     static constexpr std::size_t count() { return HWY_LANES(T); }
 };
@@ -166,10 +168,20 @@ HWY_INLINE Lanes<T, K> quantise(Lanes<T, K> x, const Rescale& to) {
     const auto biased = [&] { return hn::Add(x.v, hn::Set(d, static_cast<T>(to.bias))); };
     if constexpr (K == KnownRescales::halves_up) return {shift_right_same(biased(), to.shift)};
     if constexpr (K == KnownRescales::halves_to_even) {
-        if (to.shift > 0)
+        if (to.shift > 0) {
+#if HWY_TARGET <= HWY_AVX3
+            // Halves up; what was a half loses the last bit: one instruction less where masks are cheap.
+            const auto sum = hn::Add(x.v, hn::Set(d, static_cast<T>(to.bias + to.to_even)));
+            const auto rest = hn::Set(d, static_cast<T>((T{1} << to.shift) - 1));
+            const auto half = hn::Eq(hn::And(sum, rest), hn::Zero(d));
+            const auto up = shift_right_same(sum, to.shift);
+            x.v = hn::IfThenElse(half, hn::AndNot(hn::Set(d, static_cast<T>(to.to_even)), up), up);
+#else
             x.v = shift_right_same(hn::Add(biased(), hn::And(shift_right_same(x.v, to.shift),
                                                              hn::Set(d, static_cast<T>(to.to_even)))),
                                    to.shift);
+#endif
+        }
         return to.limits ? clamp(x, limit_in_lanes<T, K>(to.lowest), limit_in_lanes<T, K>(to.highest)) : x;
     }
     if (to.shift <= 0) {
@@ -291,28 +303,58 @@ HWY_INLINE std::array<std::array<Lanes<std::int32_t, K>, 4>, 2> load_neighbours(
                third = halves_of<K>(words[2]), fourth = halves_of<K>(words[3]);
     return {{{first[0], first[1], second[0], second[1]}, {third[0], third[1], fourth[0], fourth[1]}}};
 }
-/// Blends of packed pairs (low half: weight 0), unsigned, by weights of at most 14 bits.
-HWY_INLINE auto blend_pairs(hn::Vec<hn::ScalableTag<std::int32_t>> pairs,
-                            hn::Vec<hn::ScalableTag<std::int32_t>> weight, int weight_bits) {
+/// Pairs of unsigned 16-bit words as the signed ones that blend_pairs multiplies: less 2^15 each, unless all
+/// are below that.
+template <bool kBelow15Bits>
+HWY_INLINE auto signed_pairs(hn::Vec<hn::ScalableTag<std::int32_t>> pairs) {
+    if constexpr (kBelow15Bits) return pairs;
+    return hn::Xor(pairs, hn::Set(hn::ScalableTag<std::int32_t>(), static_cast<std::int32_t>(0x80008000)));
+}
+/// 1 - w in the low half, w in the high one; at most 14 bits of fraction.
+HWY_INLINE auto pair_weights(hn::Vec<hn::ScalableTag<std::int32_t>> weight, int weight_bits) {
+    const hn::ScalableTag<std::int32_t> d;
+    return hn::Or(hn::Sub(hn::Set(d, 1 << weight_bits), weight), hn::ShiftLeft<16>(weight));
+}
+/// Blends of packed signed pairs (low half: weight 0) plus `offset`, quantised.
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int32_t, K> blend_pairs(hn::Vec<hn::ScalableTag<std::int32_t>> pairs,
+                                              hn::Vec<hn::ScalableTag<std::int32_t>> weights,
+                                              std::int32_t offset, const Rescale& to) {
     const hn::ScalableTag<std::int32_t> d;
 #if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR
-    // Highway's operation is x86's pairwise one here: one instruction for both products and their sum.  Its
-    // factors are signed: 2^15 is taken from both values, and given back to their mean.
+    // Highway's operation is x86's pairwise one here: one instruction for both products and their sum.
     const hn::ScalableTag<std::int16_t> d16;
-    const auto weights = hn::Or(hn::Sub(hn::Set(d, 1 << weight_bits), weight), hn::ShiftLeft<16>(weight));
-    const auto centred = hn::Xor(pairs, hn::Set(d, static_cast<std::int32_t>(0x80008000)));
     auto unused = hn::Zero(d);
-    return hn::ReorderWidenMulAccumulate(d, hn::BitCast(d16, centred), hn::BitCast(d16, weights),
-                                         hn::Set(d, 1 << (weight_bits + 15)), unused);
+    const auto sum = [&](std::int32_t start) {
+        return hn::ReorderWidenMulAccumulate(d, hn::BitCast(d16, pairs), hn::BitCast(d16, weights),
+                                             hn::Set(d, start), unused);
+    };
 #else
-    const auto low = hn::And(pairs, hn::Set(d, 0xffff)),
-               high = hn::And(hn::ShiftRight<16>(pairs), hn::Set(d, 0xffff));
-    return hn::Add(shift_left_same(low, weight_bits), hn::Mul(weight, hn::Sub(high, low)));
+    const auto low = [](auto v) { return hn::ShiftRight<16>(hn::ShiftLeft<16>(v)); };
+    const auto high = [](auto v) { return hn::ShiftRight<16>(v); };
+    const auto both = hn::Add(hn::Mul(low(pairs), low(weights)), hn::Mul(high(pairs), high(weights)));
+    const auto sum = [&](std::int32_t start) { return hn::Add(both, hn::Set(d, start)); };
 #endif
+    if constexpr (K == KnownRescales::halves_up)
+        return {shift_right_same(sum(offset + static_cast<std::int32_t>(to.bias)), to.shift)};
+    return quantise(Lanes<std::int32_t, K>{sum(offset)}, to);
+}
+/// Rows `row` and `row + 1` of four words each.
+template <KnownRescales K>
+HWY_INLINE std::array<std::array<Lanes<std::int32_t, K>, 4>, 2> load_two_rows(const std::int32_t* rows,
+                                                                              Lanes<std::int32_t, K> row) {
+    const hn::ScalableTag<std::int32_t> d;
+    using L = Lanes<std::int32_t, K>;
+    alignas(64) std::int32_t at[HWY_LANES(std::int32_t)];
+    hn::Store(row.v, d, at);
+    const auto a = load_quads([&](int lane) { return rows + std::int64_t{4} * at[lane]; });
+    const auto b = load_quads([&](int lane) { return rows + std::int64_t{4} * at[lane] + 4; });
+    return {{{L{a[0]}, L{a[1]}, L{a[2]}, L{a[3]}}, {L{b[0]}, L{b[1]}, L{b[2]}, L{b[3]}}}};
 }
 template <class T, KnownRescales K>
-HWY_INLINE std::array<Lanes<T, K>, 4> blend_rows(const Table& table, Lanes<T, K> row, Lanes<T, K> weight,
-                                                 int weight_bits) {
+HWY_INLINE std::array<Lanes<T, K>, 4> lerp_rows(const Table& table, Lanes<T, K> row, Lanes<T, K> weight,
+                                                int weight_bits, const Rescale& to_color,
+                                                const Rescale& to_alpha) {
     using L = Lanes<T, K>;
     if constexpr (sizeof(T) == 4)
         if (const std::int32_t* paired = table.paired(); paired && weight_bits <= 14) {
@@ -320,14 +362,17 @@ HWY_INLINE std::array<Lanes<T, K>, 4> blend_rows(const Table& table, Lanes<T, K>
             alignas(64) T at[HWY_LANES(T)];
             hn::Store(row.v, d, at);
             const auto pairs = load_quads([&](int lane) { return paired + std::int64_t{4} * at[lane]; });
-            return {L{blend_pairs(pairs[0], weight.v, weight_bits)},
-                    L{blend_pairs(pairs[1], weight.v, weight_bits)},
-                    L{blend_pairs(pairs[2], weight.v, weight_bits)},
-                    L{blend_pairs(pairs[3], weight.v, weight_bits)}};
+            const auto weights = pair_weights(weight.v, weight_bits);
+            const std::int32_t offset = 1 << (weight_bits + 15);
+            return {blend_pairs<K>(pairs[0], weights, offset, to_color),
+                    blend_pairs<K>(pairs[1], weights, offset, to_color),
+                    blend_pairs<K>(pairs[2], weights, offset, to_color),
+                    blend_pairs<K>(pairs[3], weights, offset, to_alpha)};
         }
     const L next = row + make_word(WordTag<L>{}, 1);
     const auto between = [&](int c) {
-        return blend(gather(table, row, c), gather(table, next, c), weight, weight_bits);
+        return quantise(blend(gather(table, row, c), gather(table, next, c), weight, weight_bits),
+                        c < 3 ? to_color : to_alpha);
     };
     return {between(0), between(1), between(2), between(3)};
 }
@@ -344,10 +389,8 @@ HWY_INLINE std::array<Lanes<std::int32_t, K>, 4> gather_cell(const CellTable& ta
         const auto* words = reinterpret_cast<const std::int32_t*>(table.narrow_words());
         const auto low = hn::GatherIndex(d, words, hn::Add(cell, cell));
         const auto high = hn::GatherIndex(d, words, hn::Add(hn::Add(cell, cell), hn::Set(d, 1)));
-        const auto mask = hn::Set(d, 0xffff);
-        const hn::RebindToUnsigned<decltype(d)> du;
-        const auto upper = [&](auto v) { return hn::BitCast(d, hn::ShiftRight<16>(hn::BitCast(du, v))); };
-        return {L{hn::And(low, mask)}, L{upper(low)}, L{hn::And(high, mask)}, L{upper(high)}};
+        const auto first = halves_of<K>(low), second = halves_of<K>(high);
+        return {first[0], first[1], second[0], second[1]};
     }
     const auto* words = reinterpret_cast<const std::int32_t*>(table.wide_words());
     const auto first = hn::ShiftLeft<2>(cell);
@@ -503,6 +546,142 @@ HWY_INLINE Lanes<T, K> quotient(Lanes<T, K> numerator, Lanes<T, K> denominator, 
         q.v = hn::Add(q.v, hn::IfThenElseZero(up, one));
     }
     return clamp(q, limit_in_lanes<T, K>(to.lowest), limit_in_lanes<T, K>(to.highest));
+}
+
+// ------------------------------------------------------------------------------------------------ wide
+// numbers
+
+/// words.h's Wide of 32-bit lanes: doubles, the lower half of the lanes and the upper one.
+template <KnownRescales K>
+struct WideLanes {
+    using V = hn::Vec<hn::ScalableTag<double>>;
+    V low, high;
+};
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+namespace squint {
+template <KnownRescales K>
+struct WideOf<HWY_NAMESPACE::Lanes<std::int32_t, K>> {
+    using Type = HWY_NAMESPACE::WideLanes<K>;
+};
+}  // namespace squint
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+
+namespace lanes_detail {
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int32_t, K> narrow(const WideLanes<K>& x) {
+    const hn::ScalableTag<std::int32_t> d;
+#if HWY_TARGET == HWY_SCALAR
+    return {hn::Set(d, static_cast<std::int32_t>(hn::GetLane(x.low)))};
+#else
+    const hn::Half<decltype(d)> half;
+    return {hn::Combine(d, hn::DemoteTo(half, x.high), hn::DemoteTo(half, x.low))};
+#endif
+}
+template <KnownRescales K, class F>
+HWY_INLINE WideLanes<K> by_halves(F&& f) {
+#if HWY_TARGET == HWY_SCALAR
+    const auto only = f([](const auto& x) { return x.low; });
+    return {only, only};
+#else
+    return {f([](const auto& x) { return x.low; }), f([](const auto& x) { return x.high; })};
+#endif
+}
+}  // namespace lanes_detail
+/// 64-bit lanes are wide themselves.
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int64_t, K> widen(Lanes<std::int64_t, K> x) {
+    return x;
+}
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int64_t, K> wide_sum(Lanes<std::int64_t, K> high, int bits,
+                                           Lanes<std::int64_t, K> low) {
+    return shift_left(high, bits) + low;
+}
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int64_t, K> wide_product(Lanes<std::int64_t, K> a, Lanes<std::int64_t, K> b) {
+    return a * b;
+}
+template <KnownRescales K>
+HWY_INLINE WideLanes<K> widen(Lanes<std::int32_t, K> x) {
+    const hn::ScalableTag<double> wide;
+#if HWY_TARGET == HWY_SCALAR
+    const auto only = hn::Set(wide, static_cast<double>(hn::GetLane(x.v)));
+    return {only, only};
+#else
+    const hn::Half<hn::ScalableTag<std::int32_t>> half;
+    return {hn::PromoteTo(wide, hn::LowerHalf(half, x.v)), hn::PromoteTo(wide, hn::UpperHalf(half, x.v))};
+#endif
+}
+template <KnownRescales K>
+HWY_INLINE WideLanes<K> operator+(const WideLanes<K>& a, const WideLanes<K>& b) {
+    return {hn::Add(a.low, b.low), hn::Add(a.high, b.high)};
+}
+template <KnownRescales K>
+HWY_INLINE WideLanes<K> operator-(const WideLanes<K>& a, const WideLanes<K>& b) {
+    return {hn::Sub(a.low, b.low), hn::Sub(a.high, b.high)};
+}
+template <KnownRescales K>
+HWY_INLINE WideLanes<K> shift_left(const WideLanes<K>& x, int bits) {
+    const auto factor = hn::Set(hn::ScalableTag<double>(), power_of_two<double>(bits));
+    return {hn::Mul(x.low, factor), hn::Mul(x.high, factor)};
+}
+template <KnownRescales K>
+HWY_INLINE WideLanes<K> wide_sum(Lanes<std::int32_t, K> high, int bits, Lanes<std::int32_t, K> low) {
+    return shift_left(widen(high), bits) + widen(low);
+}
+template <KnownRescales K>
+HWY_INLINE WideLanes<K> wide_product(Lanes<std::int32_t, K> a, Lanes<std::int32_t, K> b) {
+    const auto x = widen(a), y = widen(b);
+    return {hn::Mul(x.low, y.low), hn::Mul(x.high, y.high)};
+}
+template <KnownRescales K>
+HWY_INLINE WideLanes<K> absolute(const WideLanes<K>& x) {
+    return {hn::Abs(x.low), hn::Abs(x.high)};
+}
+template <KnownRescales K>
+HWY_INLINE WideLanes<K> max(const WideLanes<K>& a, const WideLanes<K>& b) {
+    return {hn::Max(a.low, b.low), hn::Max(a.high, b.high)};
+}
+/// An estimate, off by one at most, and its exact rest: the product of either half of the estimate with the
+/// denominator has 53 bits at most (range.cpp notes it).  A result beyond 32 bits saturates.
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int32_t, K> quotient(const WideLanes<K>& numerator, const WideLanes<K>& denominator,
+                                           const Rescale& to) {
+    const hn::ScalableTag<double> d;
+    const auto one = hn::Set(d, 1.0), zero = hn::Zero(d);
+    const auto factor = hn::Set(d, power_of_two<double>(-to.shift));
+    const bool to_nearest = to.rounding == Rounding::rnd || to.rounding == Rounding::rnd_conv;
+    const auto half = [&](auto part) SQUINT_WRITTEN_OUT {
+        const auto below = part(denominator), scaled = hn::Mul(part(numerator), factor);
+        const auto estimate = hn::Mul(scaled, hn::Div(one, below));
+        auto q = to_nearest ? hn::Round(estimate) : hn::Trunc(estimate);
+#if (HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2 && HWY_TARGET != HWY_SCALAR) || HWY_ARCH_ARM_A64
+        const auto rest = hn::NegMulAdd(q, below, scaled);  // one rounding alone
+#else
+        const auto coarse = hn::Mul(hn::Trunc(hn::Mul(q, hn::Set(d, power_of_two<double>(-to.width / 2)))),
+                                    hn::Set(d, power_of_two<double>(to.width / 2)));
+        const auto rest =
+            hn::Sub(hn::Sub(scaled, hn::Mul(coarse, below)), hn::Mul(hn::Sub(q, coarse), below));
+#endif
+        if (!to_nearest) {
+            q = hn::Sub(q, hn::IfThenElseZero(hn::Lt(rest, zero), one));
+            return hn::Add(q, hn::IfThenElseZero(hn::Ge(rest, below), one));
+        }
+        const auto twice = hn::Add(rest, rest);
+        auto down = hn::Lt(twice, hn::Neg(below)), up = hn::Ge(twice, below);
+        if (to.rounding == Rounding::rnd_conv) {
+            const auto halved = hn::Mul(q, hn::Set(d, 0.5));
+            const auto odd = hn::Ne(halved, hn::Trunc(halved));
+            down = hn::Or(down, hn::And(hn::Eq(twice, hn::Neg(below)), odd));
+            up = hn::Or(hn::Gt(twice, below), hn::And(hn::Eq(twice, below), odd));
+        }
+        q = hn::Sub(q, hn::IfThenElseZero(down, one));
+        return hn::Add(q, hn::IfThenElseZero(up, one));
+    };
+    const auto q = lanes_detail::narrow(lanes_detail::by_halves<K>(half));
+    return clamp(q, limit_in_lanes<std::int32_t, K>(to.lowest), limit_in_lanes<std::int32_t, K>(to.highest));
 }
 
 // ------------------------------------------------------------------------------------------------ memory:

@@ -27,9 +27,10 @@ struct Rescale {
     int width = 0;  // for wrapping, with is_signed
     bool is_signed = false;
     bool wraps = false;
-    bool limits = true;  // false where the plan has proven that no value passes them: lanes leave them out
-    bool active = true;  // Real: round and limit, or pass through (see words.h)
-    int wire = -1;       // whose it is, for audits and traces
+    bool limits = true;    // false where the plan has proven that no value passes them: lanes leave them out
+    bool active = true;    // Real: round and limit, or pass through (see words.h)
+    bool divides = false;  // a quotient's, which asks for its rounding itself
+    int wire = -1;         // whose it is, for audits and traces
     WireStatistics* statistics = nullptr;  // Audited: where to count
     Rounding rounding = Rounding::trn;
 
@@ -59,7 +60,8 @@ enum class KnownRescales {
     halves_up,       // as above without halves to even, and without limits
 };
 inline bool holds(KnownRescales known, const Rescale& to, int lane_bits) {
-    if (to.width == 0 || known == KnownRescales::nothing) return true;  // a wire nothing flows through
+    // A wire nothing flows through, or one that quantise() does not meet.
+    if (to.width == 0 || to.divides || known == KnownRescales::nothing) return true;
     if (to.shift < 0 || to.shift >= lane_bits || to.to_zero != 0) return false;
     return known == KnownRescales::halves_up ? to.to_even == 0 && !to.limits : !(to.limits && to.wraps);
 }

@@ -152,4 +152,48 @@ Range quotient(Range numerator, Range denominator, const Rescale& to) {
     return to.wraps ? Range{to.lowest, to.highest} : Range{std::min<Int128>(q.low, to.highest), to.highest};
 }
 
+namespace {
+WideRange noted_as_wide(Int128 low, Int128 high) {
+    const Range result{cap(low), cap(high)};
+    Range::needs.result_bits = std::max(Range::needs.result_bits, signed_bits(result));
+    Range::needs.wide_bits = std::max(Range::needs.wide_bits, signed_bits(result));
+    return {result};
+}
+}  // namespace
+WideRange widen(Range x) {
+    return {x};
+}
+WideRange wide_sum(Range high, int bits, Range low) {
+    const Int128 factor = Int128{1} << bits;
+    return noted_as_wide(product(high.low, factor) + low.low, product(high.high, factor) + low.high);
+}
+WideRange wide_product(Range a, Range b) {
+    note_operands(a, b);
+    const Range all = spanning(
+        {product(a.low, b.low), product(a.low, b.high), product(a.high, b.low), product(a.high, b.high)});
+    return noted_as_wide(all.low, all.high);
+}
+WideRange operator-(WideRange a, WideRange b) {
+    return noted_as_wide(a.range.low - b.range.high, a.range.high - b.range.low);
+}
+WideRange shift_left(WideRange x, int bits) {
+    const Int128 factor = Int128{1} << bits;
+    return noted_as_wide(product(x.range.low, factor), product(x.range.high, factor));
+}
+WideRange absolute(WideRange x) {
+    const auto& [low, high] = x.range;
+    return noted_as_wide(low > 0 ? low : high < 0 ? -high : 0, std::max(high, -low));
+}
+WideRange max(WideRange a, WideRange b) {
+    return {max(a.range, b.range)};
+}
+Range quotient(WideRange numerator, WideRange denominator, const Rescale& to) {
+    const int lanes_before = Range::needs.lane_bits;
+    const Range q = quotient(numerator.range, denominator.range, to);
+    Range::needs.lane_bits = std::max(lanes_before, to.wraps || to.width > 31 ? 65 : 0);
+    // The product of either half of a result with the denominator.
+    noted_as_wide(0, product(std::max<Int128>(denominator.range.high, 1), Int128{1} << (to.width / 2 + 2)));
+    return q;
+}
+
 }  // namespace squint

@@ -37,8 +37,8 @@ class Table {
         return data_ && !data_->narrow.empty() ? data_->narrow.data() : nullptr;
     }
     /// Of a table of four columns of unsigned 16-bit words: word c of row i in the low half, the same of row
-    /// i + 1 in the high half, at i * 4 + c.  One load for lanes that blend two rows.  Null where a word does
-    /// not fit.  Made by pair_rows(), once the table is built.
+    /// i + 1 in the high half, at i * 4 + c, each less 2^15 and signed.  One load for lanes that blend two
+    /// rows.  Null where a word does not fit.  Made by pair_rows(), once the table is built.
     const std::int32_t* paired() const {
         return data_ && !data_->paired.empty() ? data_->paired.data() : nullptr;
     }
@@ -49,7 +49,8 @@ class Table {
             const std::int64_t here = data_->words[i],
                                next = i + 4 < data_->words.size() ? data_->words[i + 4] : here;
             if ((here | next) >> 16) return data_->paired.clear();
-            data_->paired.push_back(static_cast<std::int32_t>(static_cast<std::uint32_t>(here | next << 16)));
+            data_->paired.push_back(
+                static_cast<std::int32_t>(static_cast<std::uint32_t>(here | next << 16) ^ 0x80008000U));
         }
     }
     const std::vector<std::int64_t>& words() const { return data_->words; }

@@ -336,6 +336,7 @@ Real<T> quotient(Real<T> numerator, Real<T> denominator, const Rescale& to) {
 
 /// How wide a stage's numbers get.
 struct WordNeeds {
+    int wide_bits = 0;     // the widest number of a Wide<W>, sign included
     int operand_bits = 0;  // the widest factor of a multiplication, sign included
     int result_bits = 0;   // the widest exact result, sign included
     int lane_bits = 0;     // the same where numbers may wrap on the way to a result that fits: lanes do
@@ -343,6 +344,7 @@ struct WordNeeds {
         operand_bits = std::max(operand_bits, other.operand_bits);
         result_bits = std::max(result_bits, other.result_bits);
         lane_bits = std::max(lane_bits, other.lane_bits);
+        wide_bits = std::max(wide_bits, other.wide_bits);
     }
 };
 
@@ -391,13 +393,58 @@ Range vector_length(const std::array<Range, 3>& v, int guard);
 Range quantise(Range x, const Rescale& to);
 Range quotient(Range numerator, Range denominator, const Rescale& to);
 
-/// Rows `row` and `row + 1` of a table of four columns, blended.
+// ------------------------------------------------------------------------------------------------ wide
+// numbers
+
+/// A few numbers of a stage may need more bits than all others: differences of sums, which a quotient makes
+/// small again.  A Wide<W> holds them next to W: it is W itself where W is wide enough for anything; lanes of
+/// 32 bits take doubles, exact up to 53 bits.
+///
+///   widen  wide_sum  wide_product  -  shift_left  absolute  max  quotient
 template <class W>
-std::array<W, 4> blend_rows(const Table& table, W row, W weight, int weight_bits) {
+struct WideOf {
+    using Type = W;
+};
+template <class W>
+using Wide = typename WideOf<W>::Type;
+template <class W>
+constexpr W widen(W x) {
+    return x;
+}
+/// high 2^bits + low.
+template <class W>
+constexpr W wide_sum(W high, int bits, W low) {
+    return shift_left(high, bits) + low;
+}
+template <class W>
+constexpr W wide_product(W a, W b) {
+    return a * b;
+}
+struct WideRange {
+    Range range;
+};
+template <>
+struct WideOf<Range> {
+    using Type = WideRange;
+};
+WideRange widen(Range x);
+WideRange wide_sum(Range high, int bits, Range low);
+WideRange wide_product(Range a, Range b);
+WideRange operator-(WideRange a, WideRange b);
+WideRange shift_left(WideRange x, int bits);
+WideRange absolute(WideRange x);
+WideRange max(WideRange a, WideRange b);
+Range quotient(WideRange numerator, WideRange denominator, const Rescale& to);
+
+/// Between rows `row` and `row + 1` of a table of four columns: red, green, blue, alpha.
+template <class W>
+std::array<W, 4> lerp_rows(const Table& table, W row, W weight, int weight_bits, const Rescale& to_color,
+                           const Rescale& to_alpha) {
     std::array<W, 4> between;
     for (int c = 0; c < 4; ++c)
-        between[static_cast<std::size_t>(c)] =
-            blend(gather(table, row, c), gather(table, row + constant<W>(1), c), weight, weight_bits);
+        between[static_cast<std::size_t>(c)] = quantise(
+            blend(gather(table, row, c), gather(table, row + constant<W>(1), c), weight, weight_bits),
+            c < 3 ? to_color : to_alpha);
     return between;
 }
 

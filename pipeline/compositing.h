@@ -51,6 +51,8 @@ struct Accumulated {
 }  // namespace squint
 #endif
 
+#include "fixedpoint/unrolled.h"
+
 #include <hwy/highway.h>
 #if defined(SQUINT_PIPELINE_COMPOSITING_TARGET) == defined(HWY_TARGET_TOGGLE)
 #ifdef SQUINT_PIPELINE_COMPOSITING_TARGET
@@ -105,11 +107,11 @@ HWY_INLINE void composite(const CompositingStage& s, Accumulated<W>& pixel, std:
     W& t = pixel.transparency;
     if (s.form == CompositingForm::w) {
         const W w = quantise(alpha * t, s.to_contribution);
-        for (std::size_t c = 0; c < 3; ++c) {
+        for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
             const W share =
                 s.premultiplied ? quantise(color[c] * t, s.to_color) : quantise(color[c] * w, s.to_color);
             pixel.color[c] = quantise(pixel.color[c] + share, s.to_color_sum);
-        }
+        });
         const int finer = std::max(s.contribution_fraction - s.transparency_fraction, 0);
         const int coarser = std::max(s.transparency_fraction - s.contribution_fraction, 0);
         t = quantise(shift_left(t, finer) - shift_left(w, coarser), s.to_transparency);

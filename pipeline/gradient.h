@@ -82,22 +82,25 @@ HWY_INLINE W sobel_difference(const N& n, int x, int y, int z, int axis) {
     return sum;
 }
 
+/// Between the differences at two neighbours along x, the cell's own in row (y, z).
+template <class W, class N>
+HWY_INLINE W lerped_difference(const GradientStage& s, const N& n, int y, int z, int axis, W weight) {
+    const auto at = [&](int x) {
+        return s.rule == GradientRule::sobel ? sobel_difference<W>(n, x, y, z, axis)
+                                             : central_difference(n, x, y, z, axis);
+    };
+    return lerp(at(1), at(2), weight, s.weight_bits, s.to_first);
+}
+
 /// Differences at the cell's eight voxels, interpolated like a sample.
 template <class W, class N>
 HWY_INLINE W interpolated_difference(const GradientStage& s, const N& n, const std::array<W, 3>& weight,
                                      int axis) {
-    std::array<W, 8> d;
-    for (int i = 0; i < 8; ++i) {
-        const int x = 1 + (i & 1), y = 1 + (i >> 1 & 1), z = 1 + (i >> 2);
-        d[static_cast<std::size_t>(i)] = s.rule == GradientRule::sobel ? sobel_difference<W>(n, x, y, z, axis)
-                                                                       : central_difference(n, x, y, z, axis);
-    }
-    const int bits = s.weight_bits;
-    const W z0 = lerp(lerp(d[0], d[1], weight[0], bits, s.to_first),
-                      lerp(d[2], d[3], weight[0], bits, s.to_first), weight[1], bits, s.to_second);
-    const W z1 = lerp(lerp(d[4], d[5], weight[0], bits, s.to_first),
-                      lerp(d[6], d[7], weight[0], bits, s.to_first), weight[1], bits, s.to_second);
-    return lerp(z0, z1, weight[2], bits, s.to_gradient);
+    const auto along_x = [&](int y, int z)
+                             SQUINT_WRITTEN_OUT { return lerped_difference(s, n, y, z, axis, weight[0]); };
+    const W z0 = lerp(along_x(1, 1), along_x(2, 1), weight[1], s.weight_bits, s.to_second);
+    const W z1 = lerp(along_x(1, 2), along_x(2, 2), weight[1], s.weight_bits, s.to_second);
+    return lerp(z0, z1, weight[2], s.weight_bits, s.to_gradient);
 }
 
 /// The exact derivative of the trilinear cell along an axis: the four edges' differences, interpolated
@@ -149,16 +152,18 @@ template <class W>
 HWY_INLINE std::array<W, 3> normalise(const GradientStage& s, const std::array<W, 3>& gradient) {
     const W zero = constant<W>(0);
     std::array<W, 3> size, normal;
-    for (std::size_t a = 0; a < 3; ++a) size[a] = absolute(gradient[a]);
+    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT { size[a] = absolute(gradient[a]); });
     const W largest = max(max(size[0], size[1]), size[2]);
     const auto nothing = largest == zero;
     const W shift = constant<W>(kNormalBits) - bit_length(largest);
-    for (W& part : size) part = within(shift_by(part, shift), 0, (std::int64_t{1} << kNormalBits) - 1);
+    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+        size[a] = within(shift_by(size[a], shift), 0, (std::int64_t{1} << kNormalBits) - 1);
+    });
     const W length = max(vector_length(size, kNormalGuard), constant<W>(1));
-    for (std::size_t a = 0; a < 3; ++a) {
+    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
         const W part = quotient(size[a], length, s.to_normal);
         normal[a] = select(nothing, zero, select(gradient[a] < zero, part, zero - part));
-    }
+    });
     return normal;
 }
 

@@ -26,14 +26,16 @@ template <class W>
 struct Cell {
     std::array<W, 8> corner;
     W at(int i) const { return corner[static_cast<std::size_t>(i)]; }
-    /// Corners 2 i and 2 i + 1 blended, exact.
-    W along_x(int i, W weight, int weight_bits) const {
-        return blend(at(2 * i), at(2 * i + 1), weight, weight_bits);
+    /// Between corners 2 i and 2 i + 1.
+    W along_x(int i, W weight, int weight_bits, const Rescale& to) const {
+        return quantise(blend(at(2 * i), at(2 * i + 1), weight, weight_bits), to);
     }
 };
 
 }  // namespace squint
 #endif
+
+#include "fixedpoint/unrolled.h"
 
 #include <hwy/highway.h>
 #if defined(SQUINT_PIPELINE_INTERPOLATION_TARGET) == defined(HWY_TARGET_TOGGLE)
@@ -65,11 +67,11 @@ HWY_INLINE W interpolate(const InterpolationStage& s, const C& cell, const std::
         const W y1 = pick(pick(cell.at(4), cell.at(5), 0), pick(cell.at(6), cell.at(7), 0), 1);
         return shift_left(pick(y0, y1, 2), s.sample_fraction);
     }
-    std::array<W, 4> x;  // y fastest
-    for (int i = 0; i < 4; ++i)
-        x[static_cast<std::size_t>(i)] = quantise(cell.along_x(i, weight[0], s.weight_bits), s.to_x);
-    const W z0 = lerp(x[0], x[1], weight[1], s.weight_bits, s.to_y);
-    const W z1 = lerp(x[2], x[3], weight[1], s.weight_bits, s.to_y);
+    const auto along_x = [&](int i) SQUINT_WRITTEN_OUT {  // y fastest
+        return cell.along_x(i, weight[0], s.weight_bits, s.to_x);
+    };
+    const W z0 = lerp(along_x(0), along_x(1), weight[1], s.weight_bits, s.to_y);
+    const W z1 = lerp(along_x(2), along_x(3), weight[1], s.weight_bits, s.to_y);
     return lerp(z0, z1, weight[2], s.weight_bits, s.to_sample);
 }
 

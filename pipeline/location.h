@@ -63,6 +63,8 @@ struct CellPosition {
 }  // namespace squint
 #endif
 
+#include "fixedpoint/unrolled.h"
+
 #include <hwy/highway.h>
 #if defined(SQUINT_PIPELINE_LOCATION_TARGET) == defined(HWY_TARGET_TOGGLE)
 #ifdef SQUINT_PIPELINE_LOCATION_TARGET
@@ -86,15 +88,28 @@ HWY_INLINE W stage_constant(std::int64_t raw, double exact, int fraction, bool a
     return W::from(active ? static_cast<double>(raw) : exact * power_of_two<double>(fraction));
 }
 
-/// P0 + k V along one axis, exact, quantised once, then clamped to the box: a location never wraps round.
+/// V along one axis, with the fraction bits of P0 + k V.
 template <class W>
-HWY_INLINE W locate(const LocationStage& s, const RayWords<W>& ray, W k, int axis) {
+HWY_INLINE W stride(const LocationStage& s, const RayWords<W>& ray, int axis) {
+    return shift_left(ray.step[static_cast<std::size_t>(axis)], s.common_fraction - s.direction_fraction);
+}
+/// P0 + k V along one axis, exact.
+template <class W>
+HWY_INLINE W exact_location(const LocationStage& s, const RayWords<W>& ray, W k, int axis) {
     const auto a = static_cast<std::size_t>(axis);
     const W start = shift_left(ray.first[a], s.common_fraction - s.location_fraction);
-    const W stride = shift_left(ray.step[a], s.common_fraction - s.direction_fraction);
-    const W on_ray = quantise(affine(start, k, stride, s.low[a], s.high[a]), s.to_location);
-    const W here = select(k == ray.last_index, ray.last[a], on_ray);
+    return affine(start, k, stride(s, ray, axis), s.low[a], s.high[a]);
+}
+/// Sample k's location from the exact one: quantised once, then clamped to the box, for it never wraps round.
+template <class W>
+HWY_INLINE W rounded_location(const LocationStage& s, const RayWords<W>& ray, W exact, W k, int axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    const W here = select(k == ray.last_index, ray.last[a], quantise(exact, s.to_location));
     return clamp(here, constant<W>(0), constant<W>(s.limit[a]));
+}
+template <class W>
+HWY_INLINE W locate(const LocationStage& s, const RayWords<W>& ray, W k, int axis) {
+    return rounded_location(s, ray, exact_location(s, ray, k, axis), k, axis);
 }
 
 /// The cell around a location and the weights of its upper corners; at the far face the last cell with a
@@ -102,11 +117,11 @@ HWY_INLINE W locate(const LocationStage& s, const RayWords<W>& ray, W k, int axi
 template <class W>
 HWY_INLINE CellPosition<W> cell_position(const LocationStage& s, const std::array<W, 3>& location) {
     CellPosition<W> position;
-    for (std::size_t a = 0; a < 3; ++a) {
+    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
         const W cell = min(floor_shift(location[a], s.location_fraction), constant<W>(s.last_cell[a]));
         position.cell[a] = cell;
         position.weight[a] = quantise(location[a] - shift_left(cell, s.location_fraction), s.to_weight);
-    }
+    });
     return position;
 }
 

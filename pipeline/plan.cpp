@@ -203,6 +203,7 @@ void plan_gradient(Plan& plan) {
     s.isotropic = v.spacing.x == v.spacing.y && v.spacing.y == v.spacing.z;
     s.normal_fraction = fraction(plan, Wire::normal);
     s.to_normal = Rescale(-kNormalGuard, plan.specs[Wire::normal], wire_index(Wire::normal));
+    s.to_normal.divides = true;
 }
 
 void plan_input(Plan& plan) {
@@ -393,6 +394,8 @@ struct LeaveOutLimits {
 void leave_out_proven_limits(Plan& plan, const Slab<Range>& slab) {
     // A location is clamped to the box, and its format holds the box.
     if (!plan.location.to_location.wraps) plan.location.to_location.limits = false;
+    // A part of a cell is one at most.
+    plan.location.to_weight.limits = false;
     // Form w: w = q(alpha T) <= T for alpha <= 1, so T never falls below 0.  c w rounds to w at most for c <=
     // 1, so C, a sum of such shares, never passes the sum of all w, which is 1 - T.  (Lit colours may
     // pass 1.)
@@ -407,7 +410,7 @@ void leave_out_proven_limits(Plan& plan, const Slab<Range>& slab) {
     if (s.form == CompositingForm::w && !s.premultiplied && unit_slab &&
         s.contribution_fraction == s.transparency_fraction && color.integer_bits >= 1 &&
         color.fraction_bits == s.contribution_fraction)
-        s.to_color_sum.limits = s.to_transparency.limits = false;
+        s.to_color.limits = s.to_color_sum.limits = s.to_transparency.limits = false;
 }
 
 void choose_words(Plan& plan) {

@@ -61,12 +61,14 @@ WireSpecs eight_bit(const PresetInputs& in) {
 // middle levels 19 - I bits.
 WireSpecs standard(const PresetInputs& in) {
     constexpr Rounding r = Rounding::rnd_conv;
-    // Halves up where lerp(a, b, w) = lerp(b, a, 1 - w) must hold: to even, it does not
+    // Halves up where lerp(a, b, w) = lerp(b, a, 1 - w) must hold (to even, it does not), and in the tables'
+    // lerps and quotients, where a half is rare: one addition where halves to even take four operations
     // (docs/decisions/0002).
     constexpr Rounding up = Rounding::rnd;
     const int scalar = in.scalar_bits, weight = scalar <= 12 ? 12 : 10;
     const int level = 31 - scalar - weight;  // fraction bits of a middle level: I + level + weight <= 31
-    const int gradient = 12;                 // weak gradients want them, and 64-bit lanes for the lerps alone
+    // Weak gradients want fraction bits; a difference of scalars, halved, has one bit less than they.
+    const int gradient = std::min(12, 32 - scalar - weight);
     const int sum = accumulating_bits(in);
     WireSpecs w{};
     w[Wire::location] = u(in.location_bits, clip(31 - in.location_bits), r);
@@ -76,12 +78,14 @@ WireSpecs standard(const PresetInputs& in) {
     w[Wire::sample] = u(scalar, std::min(12, 24 - scalar), up);
     w[Wire::gradient_lerp] = w[Wire::gradient] = s(scalar, gradient, r), w[Wire::spacing] = u(1, 12, r);
     w[Wire::normal] = s(1, 15, r);
-    w[Wire::classification_input] = u(in.entry_bits, 8, r);
+    w[Wire::classification_input] = u(in.entry_bits, 8, up);
     w[Wire::table_color] = u(1, 15, r), w[Wire::table_alpha] = u(1, sum, r);
+    // One entry's depth times an input's 8 fraction bits fits 32, too, where the sums' 15 bits do.
+    const int depth = sum > 15 ? sum + 1 : std::min(20, 23 - in.depth_bits);
     w[Wire::table_extinction] = w[Wire::table_moment] =
-        u(in.total_depth_bits, std::min(std::max(20, sum + 1), clip(31 - in.total_depth_bits)), r);
-    w[Wire::slab_depth] = u(4, clip(sum + 3), r);
-    w[Wire::slab_ratio] = u(1, 15, r), w[Wire::slab_alpha] = w[Wire::slab_color] = u(1, sum, r);
+        u(in.total_depth_bits, std::min(depth, clip(31 - in.total_depth_bits)), r);
+    w[Wire::slab_depth] = u(4, clip(sum + 3), up);
+    w[Wire::slab_ratio] = u(1, 15, up), w[Wire::slab_alpha] = w[Wire::slab_color] = u(1, sum, up);
     w[Wire::light] = s(1, 14, r), w[Wire::dot] = s(1, 15, r), w[Wire::power] = u(1, 15, r),
     w[Wire::material] = u(1, 14, r);
     w[Wire::intensity] = u(1, 14, r), w[Wire::lit_color] = u(1, sum, r);

@@ -113,6 +113,14 @@ EntryLookup build_entry_lookup(const ClassificationInputs& in) {
                               static_cast<int>(Wire::slab_ratio));
     lookup.to_alpha = Rescale(stored.format.fraction_bits + in.input_fraction, slab_alpha,
                               static_cast<int>(Wire::slab_alpha));
+    lookup.least_opaque = lookup.to_alpha.wraps ? slab_alpha.format.smallest() : slab_alpha.format.largest();
+    for (int i = 0; i < n; ++i)
+        if (in.entries.entry[static_cast<std::size_t>(i)].opaque)
+            lookup.least_opaque =
+                std::min(lookup.least_opaque,
+                         quantise(shift_left(lookup.table.word(i, EntryLookup::alpha), in.input_fraction),
+                                  lookup.to_alpha) -
+                             1);
     lookup.length_fraction = specs[Wire::length].format.fraction_bits;
     const Spec depth = specs[Wire::slab_depth];
     lookup.to_depth = Rescale(extinction.format.fraction_bits + in.input_fraction, depth,

@@ -75,9 +75,10 @@ struct EntryLookup {
     int input_fraction = 0;
     int last_segment = 0;  // entries - 2
     bool has_opaque = false;
-    Rescale to_color, to_alpha;  // lerps between entries
-    Rescale to_depth;            // extinction between entries
-    Rescale to_shorter;          // times the length of a slab
+    std::int64_t least_opaque = 0;  // opacity that no full step of an opaque entry falls below
+    Rescale to_color, to_alpha;     // lerps between entries
+    Rescale to_depth;               // extinction between entries
+    Rescale to_shorter;             // times the length of a slab
     int length_fraction = 0;
     std::int64_t one_alpha = 0;
     int color_fraction = 0, alpha_fraction = 0;  // of the straight colour and the opacity that come out
@@ -189,9 +190,11 @@ HWY_INLINE Slab<W> classify_point(const EntryLookup& e, W input, W length) {
     const EntryPosition<W> at = entry_position(e, input);
     const W full = constant<W>(std::int64_t{1} << e.length_fraction);
     Slab<W> slab;
-    const std::array<W, 4> between = blend_rows(e.table, at.entry, at.fraction, e.input_fraction);
-    for (std::size_t c = 0; c < 3; ++c) slab.color[c] = quantise(between[c], e.to_color);
-    slab.alpha = quantise(between[EntryLookup::alpha], e.to_alpha);
+    const std::array<W, 4> between =
+        lerp_rows(e.table, at.entry, at.fraction, e.input_fraction, e.to_color, e.to_alpha);
+    slab.color = {between[0], between[1], between[2]};
+    slab.alpha = between[EntryLookup::alpha];
+    const bool may_be_opaque = e.has_opaque && any(!(slab.alpha < constant<W>(e.least_opaque)));
     const auto shorter = length < full;
     if (any(shorter)) {
         const W next = gather(e.matter, at.entry + constant<W>(1), EntryLookup::extinction);
@@ -201,7 +204,7 @@ HWY_INLINE Slab<W> classify_point(const EntryLookup& e, W input, W length) {
         const W depth = quantise(full_depth * length, e.to_shorter);
         slab.alpha = select(shorter, opacity_of_depth(e.opacity, depth), slab.alpha);
     }
-    if (e.has_opaque) slab.alpha = select(is_opaque(e, at), constant<W>(e.one_alpha), slab.alpha);
+    if (may_be_opaque) slab.alpha = select(is_opaque(e, at), constant<W>(e.one_alpha), slab.alpha);
     return slab;
 }
 

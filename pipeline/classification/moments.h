@@ -295,7 +295,7 @@ HWY_NOINLINE std::array<W, 3> color_in_pieces(const MomentSeries& m, const CutSl
         const W far =
             piece == kPieces ? cut.end_input : clamp(input_at_depth(m, max(target, zero)), low, high);
         const W far_depth = depth_at(p, entry_position(p.entries, far));
-        const W depth = depth_of(p, absolute(far_depth - near_depth), cut.span, length);
+        const W depth = depth_of(p, absolute(far_depth - near_depth), max(cut.span, constant<W>(1)), length);
         const std::array<W, 3> color = series_color(m, near, far, depth);
         const W part =
             min(quantise(through * opacity_of_depth(p.entries.opacity, depth), m.to_piece), through);

@@ -70,6 +70,7 @@ PrefixLookup build_prefix_lookup(const ClassificationInputs& in, int sub_entry_b
     }
     const int wire = static_cast<int>(Wire::slab_depth);
     p.to_depth = Rescale(extinction.format.fraction_bits + p.gained_bits() - in.input_fraction, depth, wire);
+    p.to_depth.divides = true;
     p.to_shorter = Rescale(depth.format.fraction_bits + p.entries.length_fraction, depth, wire);
     p.to_wall = Rescale(p.entries.color_fraction + p.entries.alpha_fraction, in.specs[Wire::slab_ratio],
                         static_cast<int>(Wire::slab_ratio));

@@ -80,8 +80,8 @@ namespace squint::HWY_NAMESPACE {
 
 /// A quotient whatever its wire: where the wire has fewer fraction bits than the exact quotient, the
 /// denominator is shifted.
-template <class W>
-HWY_INLINE W divide(W numerator, W denominator, const Rescale& to) {
+template <class N>
+HWY_INLINE auto divide(const N& numerator, const N& denominator, const Rescale& to) {
     if (to.shift <= 0) return quotient(numerator, denominator, to);
     Rescale whole = to;
     whole.shift = 0;
@@ -160,10 +160,11 @@ struct SlabDepth {
     W difference;                 // with it
     W depth;                      // times length over span
 };
-/// The optical depth of a difference of T over a span of inputs, for a slab of `length`.
-template <class W>
-HWY_INLINE W depth_of(const PrefixLookup& p, W difference, W span, W length) {
-    W depth = divide(difference, max(span, constant<W>(1)), p.to_depth);
+/// The optical depth of a difference of T over a span of inputs, at least one, for a slab of `length`.  N:
+/// the word or its Wide.
+template <class N, class W>
+HWY_INLINE W depth_of(const PrefixLookup& p, const N& difference, const N& span, W length) {
+    W depth = divide(difference, span, p.to_depth);
     const auto shorter = length < constant<W>(std::int64_t{1} << p.entries.length_fraction);
     if (any(shorter)) depth = select(shorter, quantise(depth * length, p.to_shorter), depth);
     return depth;
@@ -178,7 +179,7 @@ HWY_INLINE SlabDepth<W> slab_depth(const PrefixLookup& p, const CutSlab<W>& cut,
     d.straight = absolute(end - front);
     d.difference =
         p.curved ? absolute(curved_from(p, d.end, end) - curved_from(p, d.front, front)) : d.straight;
-    d.depth = depth_of(p, d.difference, cut.span, length);
+    d.depth = depth_of(p, d.difference, max(cut.span, constant<W>(1)), length);
     return d;
 }
 

@@ -111,6 +111,7 @@ EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, b
     };
     EmptySpace space;
     const Index3 n = space.blocks = ranges.blocks;
+    space.distance.reserve(ranges.smallest.size() + 3);  // lanes read four bytes at any of them
     space.distance.assign(ranges.smallest.size(), 255);
     const int reach = between_samples ? 1 : 0;
     std::atomic<std::int64_t> visible{0};

@@ -44,11 +44,11 @@ std::int64_t find_target(const std::string& name) {
 StageKernels kernels_for(const Plan& plan, const StageWays& ways, const VoxelSource& source,
                          std::int64_t target) {
     StageKernels kernels;
-    sampling_kernels(target, ways, kernels);
+    sampling_kernels(target, plan, ways, kernels);
     voxel_kernels(target, source, kernels);
     classification_kernel(target, plan, ways.classification, kernels);
     shading_kernel(target, ways, kernels);
-    compositing_kernel(target, ways.compositing, kernels);
+    compositing_kernel(target, plan, ways.compositing, kernels);
     return kernels;
 }
 

@@ -70,11 +70,11 @@ StageKernels kernels_for(const Plan& plan, const StageWays& ways, const VoxelSou
                          std::int64_t target);
 
 // One a file of kernels.
-void sampling_kernels(std::int64_t target, const StageWays& ways, StageKernels& kernels);
+void sampling_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels);
 void voxel_kernels(std::int64_t target, const VoxelSource& source, StageKernels& kernels);
 void classification_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);
 void shading_kernel(std::int64_t target, const StageWays& ways, StageKernels& kernels);
-void compositing_kernel(std::int64_t target, const StageWay& way, StageKernels& kernels);
+void compositing_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);
 
 /// Calls f with the word for a way; `Known` is what a kernel is compiled to take for granted where it can.
 template <template <class, KnownRescales> class Lanes, KnownRescales Known, class F>

@@ -11,17 +11,38 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
+
+/// pips.h's rows by loads of whole ones.
+template <KnownRescales K>
+HWY_INLINE std::array<std::array<Lanes<std::int32_t, K>, 4>, 2> prefix_rows(const PowerSeriesOfOrder1& m,
+                                                                            Lanes<std::int32_t, K> row) {
+    return load_two_rows(m.rows->data(), row);
+}
+
 namespace {
+
+/// What a method knows of a sample: its input, for most.
+template <class M, class L>
+HWY_INLINE L sample_of(const M&, L input) {
+    return input;
+}
 
 template <class L, class M>
 void classify_rows(const Plan& plan, int steps, lanes::Samples& samples) {
     const M& method = std::get<M>(plan.method);
-    for (int at = 0; at < steps * lanes::kRays; at += static_cast<int>(L::count())) {
-        const L front = load<L>(samples.input.v + at);
-        const L back = M::kNeedsBack ? load<L>(samples.input.v + at + lanes::kRays) : front;
-        const Slab<L> slab = classify(method, front, back, load<L>(samples.length.v + at));
-        for (std::size_t c = 0; c < 3; ++c) store(slab.color[c], samples.color[c].v + at);
-        store(slab.alpha, samples.alpha.v + at);
+    for (int r = 0; r < lanes::kRays; r += static_cast<int>(L::count())) {
+        auto front = sample_of(method, load<L>(samples.input.v + r));
+        for (int row = 0; row < steps; ++row) {
+            const int at = row * lanes::kRays + r;
+            const auto back = sample_of(
+                method,
+                load<L>(samples.input.v + at + (M::kNeedsBack || row + 1 < steps ? lanes::kRays : 0)));
+            const Slab<L> slab = classify(method, front, back, load<L>(samples.length.v + at));
+            for_three([&](std::size_t c)
+                          SQUINT_WRITTEN_OUT { store(slab.color[c], samples.color[c].v + at); });
+            store(slab.alpha, samples.alpha.v + at);
+            front = back;
+        }
     }
 }
 
@@ -30,8 +51,11 @@ void classify_rows(const Plan& plan, int steps, lanes::Samples& samples) {
 void classification_kernel_of(const Plan& plan, const lanes::StageWay& way, lanes::StageKernels& kernels) {
     std::visit(
         [&]<class M>(const M&) {
-            lanes::with_word<Lanes, KnownRescales::halves_to_even>(
-                way, [&]<class L>() { kernels.classify = &classify_rows<L, M>; });
+            // Entries alone meet no limit; prefix sums' depths may.
+            constexpr KnownRescales kKnown = std::is_same_v<M, PostClassification>
+                                                 ? KnownRescales::halves_up
+                                                 : KnownRescales::halves_to_even;
+            lanes::with_word<Lanes, kKnown>(way, [&]<class L>() { kernels.classify = &classify_rows<L, M>; });
         },
         plan.method);
 }

@@ -23,53 +23,63 @@ void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int
     const L full = constant<L>(std::int64_t{1} << stage.length_fraction);
     for (int r = 0; r < kRays; r += static_cast<int>(L::count())) {
         RayWords<L> ray;
-        for (std::size_t a = 0; a < 3; ++a) {
+        // P0 + kV by adding V: exact, so the same.
+        std::array<L, 3> exact, strides, location;
+        ray.last_index = load<L>(packet.last_index.v + r);
+        const L start = constant<L>(out.first + from);
+        for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
             ray.first[a] = load<L>(packet.first[a].v + r);
             ray.last[a] = load<L>(packet.last[a].v + r);
             ray.step[a] = load<L>(packet.step[a].v + r);
-        }
-        ray.last_index = load<L>(packet.last_index.v + r);
+            exact[a] = exact_location(stage, ray, start, static_cast<int>(a));
+            strides[a] = stride(stage, ray, static_cast<int>(a));
+        });
         const L last_length = load<L>(packet.last_length.v + r);
         const L last_slab = load<L>(packet.slabs.v + r) - constant<L>(1);
         for (int row = from; row < to; ++row) {
             const int at = row * kRays + r;
             const L k = constant<L>(out.first + row);
-            const CellPosition<L> position =
-                cell_position(stage, std::array<L, 3>{locate(stage, ray, k, 0), locate(stage, ray, k, 1),
-                                                      locate(stage, ray, k, 2)});
-            for (std::size_t a = 0; a < 3; ++a) {
+            for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+                location[a] = rounded_location(stage, ray, exact[a], k, static_cast<int>(a));
+                exact[a] = exact[a] + strides[a];
+            });
+            const CellPosition<L> position = cell_position(stage, location);
+            for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
                 store(position.cell[a], out.cell[a].v + at);
                 store(position.weight[a], out.weight[a].v + at);
-            }
+            });
             store(select(k == last_slab, last_length, full), out.length.v + at);
         }
     }
 }
 
 /// A cell as it is fetched: two corners a word.
-template <class L>
+template <class L, bool kBelow15Bits>
 struct PackedCell {
     std::array<L, 4> pair;
     L at(int i) const {
         const auto both = pair[static_cast<std::size_t>(i / 2)].v;
         return {hn::And(i % 2 ? hn::ShiftRight<16>(both) : both, constant<L>(0xffff).v)};
     }
-    L along_x(int i, L weight, int weight_bits) const {
+    L along_x(int i, L weight, int weight_bits, const Rescale& to) const {
         if constexpr (sizeof(typename L::Element) == 4)
             if (weight_bits <= 14)
-                return {blend_pairs(pair[static_cast<std::size_t>(i)].v, weight.v, weight_bits)};
-        return blend(at(2 * i), at(2 * i + 1), weight, weight_bits);
+                return blend_pairs<L::kKnown>(signed_pairs<kBelow15Bits>(pair[static_cast<std::size_t>(i)].v),
+                                              pair_weights(weight.v, weight_bits),
+                                              kBelow15Bits ? 0 : 1 << (weight_bits + 15), to);
+        return quantise(blend(at(2 * i), at(2 * i + 1), weight, weight_bits), to);
     }
 };
 
 /// I: the lanes of the way from a sample to table entries, no narrower than L.
-template <class L, class I>
+template <class L, class I, bool kBelow15Bits>
 void interpolate_rows(const Plan& plan, int from, int to, lanes::Samples& samples) {
     const InterpolationStage stage = plan.interpolation;
     const InputStage input = plan.input;
     for (int at = from * kRays; at < to * kRays; at += static_cast<int>(L::count())) {
-        PackedCell<L> cell;
-        for (std::size_t i = 0; i < 4; ++i) cell.pair[i] = load<L>(samples.pair[i].v + at);
+        PackedCell<L, kBelow15Bits> cell;
+        cell.pair = {load<L>(samples.pair[0].v + at), load<L>(samples.pair[1].v + at),
+                     load<L>(samples.pair[2].v + at), load<L>(samples.pair[3].v + at)};
         const std::array<L, 3> weight{load<L>(samples.weight[0].v + at), load<L>(samples.weight[1].v + at),
                                       load<L>(samples.weight[2].v + at)};
         const L sample = interpolate(stage, cell, weight);
@@ -85,15 +95,17 @@ void interpolate_rows(const Plan& plan, int from, int to, lanes::Samples& sample
 
 }  // namespace
 
-void sampling_kernels_of(const lanes::StageWays& ways, lanes::StageKernels& kernels) {
+void sampling_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::StageKernels& kernels) {
     lanes::with_word<Lanes, KnownRescales::halves_up>(ways.location,
                                                       [&]<class L>() { kernels.locate = &locate_rows<L>; });
     lanes::with_word<Lanes, KnownRescales::halves_up>(ways.interpolation, [&]<class L>() {
         if constexpr (sizeof(typename L::Element) == 8)
-            kernels.interpolate = &interpolate_rows<L, L>;
+            kernels.interpolate = &interpolate_rows<L, L, false>;
         else
-            lanes::with_word<Lanes, KnownRescales::halves_to_even>(
-                ways.input, [&]<class I>() { kernels.interpolate = &interpolate_rows<L, I>; });
+            lanes::with_word<Lanes, KnownRescales::halves_up>(ways.input, [&]<class I>() {
+                kernels.interpolate = plan.volume->largest < 1 << 15 ? &interpolate_rows<L, I, true>
+                                                                     : &interpolate_rows<L, I, false>;
+            });
     });
 }
 
@@ -102,8 +114,8 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace squint::lanes {
-void sampling_kernels(std::int64_t target, const StageWays& ways, StageKernels& kernels) {
-    SQUINT_CALL_TARGET(target, sampling_kernels_of, ways, kernels)
+void sampling_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels) {
+    SQUINT_CALL_TARGET(target, sampling_kernels_of, plan, ways, kernels)
 }
 }  // namespace squint::lanes
 #endif

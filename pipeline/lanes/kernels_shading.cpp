@@ -19,31 +19,59 @@ template <class L>
 struct StoredNeighbourhood {
     const lanes::Batch* pair;
     int place;
+    bool below_15_bits;  // every voxel
     L at(int x, int y, int z) const {
-        const L both = load<L>(pair[(z * 4 + y) * 2 + x / 2].v + place);
+        const L both = words(x / 2, y, z);
         return {hn::And(x % 2 ? hn::ShiftRight<16>(both.v) : both.v, constant<L>(0xffff).v)};
     }
+    L words(int x, int y, int z) const { return load<L>(pair[(z * 4 + y) * 2 + x].v + place); }
 };
 
+#if HWY_TARGET != HWY_SCALAR
+/// gradient.h's, of differences in 16 bits: two of them a word.
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int32_t, K> lerped_difference(const GradientStage& s,
+                                                    const StoredNeighbourhood<Lanes<std::int32_t, K>>& n,
+                                                    int y, int z, int axis, Lanes<std::int32_t, K> weight) {
+    using L = Lanes<std::int32_t, K>;
+    if (s.rule != GradientRule::central || !n.below_15_bits || s.weight_bits > 14)
+        return lerped_difference<L, StoredNeighbourhood<L>>(s, n, y, z, axis, weight);
+    const hn::ScalableTag<std::int32_t> d;
+    const hn::ScalableTag<std::int16_t> d16;
+    const auto less = [&](auto a, auto b) {
+        return hn::BitCast(d, hn::Sub(hn::BitCast(d16, a), hn::BitCast(d16, b)));
+    };
+    const auto inner = [&](int py, int pz) {  // the cell's own two of a row of four
+        const hn::ScalableTag<std::uint32_t> du;
+        return hn::Or(hn::BitCast(d, hn::ShiftRight<16>(hn::BitCast(du, n.words(0, py, pz).v))),
+                      hn::ShiftLeft<16>(n.words(1, py, pz).v));
+    };
+    const auto differences = axis == 0   ? less(n.words(1, y, z).v, n.words(0, y, z).v)
+                             : axis == 1 ? less(inner(y + 1, z), inner(y - 1, z))
+                                         : less(inner(y, z + 1), inner(y, z - 1));
+    return blend_pairs<K>(differences, pair_weights(weight.v, s.weight_bits), 0, s.to_first);
+}
+#endif
+
 template <class L>
-HWY_INLINE std::array<L, 3> stored_gradient(const GradientStage& s, const lanes::LitSamples& lit, int end,
-                                            int at) {
-    const StoredNeighbourhood<L> near{lit.pair[end], at};
+HWY_INLINE std::array<L, 3> stored_gradient(const Plan& plan, const GradientStage& s,
+                                            const lanes::LitSamples& lit, int end, int at) {
+    const StoredNeighbourhood<L> near{lit.pair[end], at, plan.volume->largest < 1 << 15};
     const std::array<L, 3> weight{load<L>(lit.weight[end][0].v + at), load<L>(lit.weight[end][1].v + at),
                                   load<L>(lit.weight[end][2].v + at)};
-    std::array<L, 3> gradient;
-    for (int axis = 0; axis < 3; ++axis)
-        gradient[static_cast<std::size_t>(axis)] = to_world(s, voxel_difference(s, near, weight, axis), axis);
-    return gradient;
+    const auto along = [&](int axis) SQUINT_WRITTEN_OUT {
+        return to_world(s, voxel_difference(s, near, weight, axis), axis);
+    };
+    return {along(0), along(1), along(2)};
 }
 
 /// The raw gradient of slabs: of their samples, or the sum of their two ends'.
 template <class G>
 HWY_INLINE std::array<G, 3> slab_gradient(const Plan& plan, const GradientStage& stage,
                                           const lanes::LitSamples& lit, int at) {
-    std::array<G, 3> gradient = stored_gradient<G>(stage, lit, 0, at);
+    std::array<G, 3> gradient = stored_gradient<G>(plan, stage, lit, 0, at);
     if (plan.needs_back) {
-        const std::array<G, 3> other = stored_gradient<G>(stage, lit, 1, at);
+        const std::array<G, 3> other = stored_gradient<G>(plan, stage, lit, 1, at);
         for (std::size_t a = 0; a < 3; ++a) gradient[a] = gradient[a] + other[a];
     }
     return gradient;

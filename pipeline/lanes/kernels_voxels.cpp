@@ -178,6 +178,7 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
     const Index3 n = volume.dims;
     const T* data = static_cast<const T*>(volume.data.get());
     const unsigned rows = rows_of(plan.gradient.rule);
+    const bool offsets_fit = volume.voxels() < std::numeric_limits<Word>::max();
     const auto clamped = [](std::int64_t i, std::int64_t end) {
         return std::clamp<std::int64_t>(i, 0, end - 1);
     };
@@ -199,6 +200,28 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
                     const int i = lane < here ? at + lane : at;
                     low[lane] = data + (cell[0].v[i] - 1) +
                                 n.x * ((cell[1].v[i] - 1) + n.y * std::int64_t{cell[2].v[i] - 1});
+                }
+                if (sizeof(T) == 1 && offsets_fit) {
+                    // Four bytes are one gather.
+                    auto first = hn::Sub(hn::Load(d, cell[2].v + at), hn::Set(d, 1));
+                    for (const int a : {1, 0})
+                        first = hn::Add(hn::Mul(first, hn::Set(d, static_cast<Word>(n[a]))),
+                                        hn::Sub(hn::Load(d, cell[a].v + at), hn::Set(d, 1)));
+                    // Lanes behind the last sample look at the first voxel.
+                    first = hn::IfThenElseZero(hn::FirstN(d, static_cast<std::size_t>(here)), first);
+                    for (int row = 0; row < 16; ++row) {
+                        if (!(rows >> row & 1)) continue;
+                        const T* line = data + n.x * (row % 4 + n.y * (row / 4));
+                        const auto four = hn::GatherOffset(d, reinterpret_cast<const Word*>(line), first);
+                        const auto spread = [&](auto two) {
+                            return hn::And(hn::Or(two, hn::ShiftLeft<8>(two)), hn::Set(d, 0x00ff00ff));
+                        };
+                        const hn::RebindToUnsigned<decltype(d)> du;
+                        const auto upper = hn::BitCast(d, hn::ShiftRight<16>(hn::BitCast(du, four)));
+                        hn::Store(spread(hn::And(four, hn::Set(d, 0xffff))), d, pair[2 * row].v + at);
+                        hn::Store(spread(upper), d, pair[2 * row + 1].v + at);
+                    }
+                    continue;
                 }
                 for (int row = 0; row < 16; ++row) {
                     if (!(rows >> row & 1)) continue;
@@ -244,7 +267,6 @@ int leave_out_empty(const lanes::EmptySpace& empty, const lanes::RayCourse& cour
     const std::int64_t counts[3] = {empty.blocks.x, empty.blocks.y, empty.blocks.z};
     const Word strides[3] = {1, static_cast<Word>(empty.blocks.x),
                              static_cast<Word>(empty.blocks.x * empty.blocks.y)};
-    alignas(64) Word place[kLanes], distances[kLanes];
     auto least = hn::Set(d, most);
     for (int r = 0; r < kRays; r += kLanes) {
         const auto goes_on = hn::And(hn::Gt(hn::Load(d, pixels.active.v + r), zero),
@@ -266,9 +288,9 @@ int leave_out_empty(const lanes::EmptySpace& empty, const lanes::RayCourse& cour
             beside = hn::Or(beside, hn::Or(near_low, near_high));
             index = hn::Add(index, hn::Mul(block, hn::Set(d, strides[a])));
         }
-        hn::Store(index, d, place);
-        for (int i = 0; i < kLanes; ++i) distances[i] = empty.distance[static_cast<std::size_t>(place[i])];
-        auto distance = hn::Load(d, distances);
+        auto distance =
+            hn::And(hn::GatherOffset(d, reinterpret_cast<const Word*>(empty.distance.data()), index),
+                    hn::Set(d, 0xff));
         distance = hn::Sub(distance, hn::IfThenElseZero(beside, one));
         if (!hn::AllFalse(d, hn::And(goes_on, hn::Lt(distance, one)))) return 0;
         // To the far side of the empty blocks ahead.

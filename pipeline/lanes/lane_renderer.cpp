@@ -20,8 +20,10 @@ constexpr int kSide = 4;  // a packet is 4x4 pixels
 
 // Bits of the lanes that hold a stage; 0 where none does.
 int bits_of(const WordNeeds& needs) {
+    constexpr int kBitsOfDouble = 54;  // with a sign: what 32-bit lanes have for wide numbers
     if (needs.operand_bits > 32) return 0;
-    return needs.lane_bits <= 32 ? 32 : needs.lane_bits <= 64 ? 64 : 0;
+    if (needs.lane_bits <= 32 && needs.wide_bits <= kBitsOfDouble) return 32;
+    return std::max(needs.lane_bits, needs.wide_bits) <= 64 ? 64 : 0;
 }
 
 // The most that is known of a stage's roundings, in 32-bit lanes.
@@ -66,7 +68,8 @@ void set_up_packet(const Plan& plan, int left, int top, int right, int bottom, P
         const RaySetup& ray = setup.ray[r];
         setup.most_slabs = std::max(setup.most_slabs, ray.slabs);
         setup.rays += ray.slabs > 0;
-        const RayWords<std::int64_t> words = ray_words<std::int64_t>(plan, ray);
+        const RayWords<std::int64_t> words =
+            ray.slabs > 0 ? ray_words<std::int64_t>(plan, ray) : RayWords<std::int64_t>{};
         for (std::size_t a = 0; a < 3; ++a) {
             packet.first[a].v[r] = static_cast<Word>(words.first[a]);
             packet.last[a].v[r] = static_cast<Word>(words.last[a]);

@@ -1,0 +1,28 @@
+// Loops of a few rounds written out: what they index stays in registers, which compilers do not see in time
+// of an array whose loop they unroll themselves.
+#include <hwy/highway.h>
+#if defined(SQUINT_FIXEDPOINT_UNROLLED_TARGET) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_FIXEDPOINT_UNROLLED_TARGET
+#undef SQUINT_FIXEDPOINT_UNROLLED_TARGET
+#else
+#define SQUINT_FIXEDPOINT_UNROLLED_TARGET
+#endif
+
+#include <cstddef>
+
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+
+/// f(0), f(1), f(2): axes, channels.  f should be SQUINT_WRITTEN_OUT.
+template <class F>
+HWY_INLINE void for_three(F&& f) {
+    f(std::size_t{0}), f(std::size_t{1}), f(std::size_t{2});
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#ifndef SQUINT_WRITTEN_OUT
+#define SQUINT_WRITTEN_OUT __attribute__((always_inline))
+#endif
+#endif
