@@ -218,7 +218,13 @@ HWY_INLINE Lanes<std::int64_t, K> gather(const Table& table, Lanes<std::int64_t,
     const hn::ScalableTag<std::int64_t> d;
     const Lanes<std::int64_t, K> index = row * make_word(WordTag<Lanes<std::int64_t, K>>{}, table.columns()) +
                                          make_word(WordTag<Lanes<std::int64_t, K>>{}, column);
-    return {hn::GatherIndex(d, table.words().data(), index.v)};
+    if (const std::int32_t* narrow = table.narrow()) {
+        const hn::Rebind<std::int32_t, decltype(d)> half;
+        const hn::RebindToUnsigned<decltype(half)> low;
+        const auto at = hn::TruncateTo(low, hn::BitCast(hn::RebindToUnsigned<decltype(d)>(), index.v));
+        return {hn::PromoteTo(d, hn::GatherIndex(half, narrow, hn::BitCast(half, at)))};
+    }
+    return {hn::GatherIndex(d, table.wide(), index.v)};
 }
 
 /// The two halves of 32-bit words, unsigned.

@@ -225,13 +225,17 @@ void plan_input(Plan& plan) {
     plan.to_average = rescale(plan, fraction(plan, Wire::classification_input), Wire::classification_input);
 }
 
-void plan_classification(Plan& plan) {
+ClassificationInputs classification_inputs(const Plan& plan) {
     double step = plan.step_world;
     if (plan.projection_mode)
         step = plan.entries.unit_distance;  // one scalar stands for the ray: its opacity as declared
-    const ClassificationInputs inputs{plan.entries, plan.specs, plan.scene.classification, step,
-                                      fraction(plan, Wire::classification_input)};
-    plan.method = build_method(inputs);
+    return {
+        plan.entries, plan.specs, plan.scene.classification, step, fraction(plan, Wire::classification_input),
+        false};
+}
+
+void plan_classification(Plan& plan) {
+    plan.method = build_method(classification_inputs(plan));
     plan.needs_back = std::visit([](const auto& m) { return m.kNeedsBack; }, plan.method);
     plan.entry_reach = std::visit([](const auto& m) { return entry_reach(m); }, plan.method);
     ClassificationReport report;
@@ -590,6 +594,7 @@ struct Attach {
 }  // namespace
 
 void set_active(Plan& plan, const std::array<bool, kWires>& rounded) {
+    need_exact(plan.method, classification_inputs(plan));
     visit_stages(plan, Activate{rounded});
     Activate{rounded}(plan.to_average);
     const auto is = [&](Wire w) { return rounded[static_cast<std::size_t>(w)]; };

@@ -6,7 +6,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <memory>
+#include <span>
 
 namespace squint {
 namespace {
@@ -51,8 +54,11 @@ OpacityUnit computed_opacity_unit(const WireSpecs& specs) {
     const Spec row_spec{{1, fraction, false}, Rounding::rnd_conv, Overflow::sat};
     unit.rows = Table(rows, 1);
     unit.rows.wire = static_cast<int>(Wire::slab_alpha);
-    for (int i = 0; i < rows; ++i)
-        unit.rows.set(i, 0, -portable::expm1(-std::ldexp(i, -unit.row_bits)), row_spec);
+    std::vector<double> opacity(static_cast<std::size_t>(rows));
+    for (int i = 0; i < rows; ++i) opacity[static_cast<std::size_t>(i)] = -std::ldexp(i, -unit.row_bits);
+    portable::expm1_each(opacity, opacity);
+    for (double& value : opacity) value = -value;
+    unit.rows.fill(opacity, std::array{row_spec});
     unit.rows.set_raw(rows - 1, 0, row_spec.format.one());
     unit.to_alpha =
         Rescale(fraction + unit.depth_fraction - unit.row_bits, alpha, static_cast<int>(Wire::slab_alpha));
@@ -82,7 +88,7 @@ EntryLookup build_entry_lookup(const ClassificationInputs& in) {
                extinction = specs[Wire::table_extinction];
     const int n = in.entries.size();
     EntryLookup lookup;
-    lookup.table = Table(n, 4), lookup.matter = Table(n, 2);
+    lookup.table = Table(n, 4, in.keeps_exact), lookup.matter = Table(n, 2, in.keeps_exact);
     lookup.table.wire = static_cast<int>(Wire::table_color);
     lookup.matter.wire = static_cast<int>(Wire::table_extinction);
     lookup.input_fraction = in.input_fraction;
@@ -92,20 +98,27 @@ EntryLookup build_entry_lookup(const ClassificationInputs& in) {
     const bool rooted = in.settings.encoding == AlphaEncoding::sqrt_alpha;
     Spec stored = alpha;
     if (rooted) stored.format = {1, std::min(2 * alpha.format.fraction_bits, kMostFractionBits), false};
-    for (int i = 0; i < n; ++i) {
-        const Entry& entry = in.entries.entry[static_cast<std::size_t>(i)];
-        const double channel[3] = {entry.color.x, entry.color.y, entry.color.z};
-        for (int c = 0; c < 3; ++c) lookup.table.set(i, c, channel[c], color);
-        const double depth = entry.extinction * in.step_world;
-        const double opacity = -portable::expm1(-depth);
-        const double kept = decoded_alpha(opacity, alpha, in.settings.encoding);
-        lookup.table.set_encoded(i, EntryLookup::alpha, opacity, quantise_real(kept, stored), stored.format);
-        lookup.matter.set(i, EntryLookup::extinction, depth, extinction);
-        const bool next = i + 1 < n && in.entries.entry[static_cast<std::size_t>(i + 1)].opaque;
-        lookup.matter.set_raw(
-            i, EntryLookup::opaque,
-            entry.opaque ? EntryLookup::entry_is + (next ? EntryLookup::segment_is : 0) : 0);
+    const auto size = static_cast<std::size_t>(n);
+    const std::unique_ptr<double[]> numbers = std::make_unique_for_overwrite<double[]>(7 * size);
+    const std::span<double> opacity(numbers.get(), size), seen(numbers.get() + size, 4 * size),
+        matter(numbers.get() + 5 * size, 2 * size);
+    for (std::size_t i = 0; i < size; ++i) opacity[i] = -(in.entries.entry[i].extinction * in.step_world);
+    portable::expm1_each(opacity, opacity);
+    for (std::size_t i = 0; i < size; ++i) {
+        const Entry& entry = in.entries.entry[i];
+        opacity[i] = -opacity[i];
+        for (int c = 0; c < 3; ++c) seen[4 * i + static_cast<std::size_t>(c)] = entry.color[c];
+        seen[4 * i + EntryLookup::alpha] =
+            rooted ? decoded_alpha(opacity[i], alpha, in.settings.encoding) : opacity[i];
+        matter[2 * i] = entry.extinction * in.step_world;
+        const bool next = i + 1 < size && in.entries.entry[i + 1].opaque;
+        matter[2 * i + 1] = entry.opaque ? EntryLookup::entry_is + (next ? EntryLookup::segment_is : 0) : 0;
     }
+    lookup.table.fill(seen, std::array{color, color, color, stored});
+    for (int i = 0; rooted && i < n; ++i)
+        lookup.table.set_exact(i, EntryLookup::alpha, opacity[static_cast<std::size_t>(i)], stored.format);
+    lookup.matter.fill(matter,
+                       std::array{extinction, Spec{{2, 0, false}, Rounding::rnd_conv, Overflow::sat}});
     lookup.table.pair_rows();
     const Spec slab_alpha = specs[Wire::slab_alpha];
     // A straight colour leaves on the wire slab_ratio, an opacity on slab_alpha.

@@ -103,6 +103,7 @@ struct ClassificationInputs {
     const ClassificationSettings& settings;
     double step_world = 1;  // length of a full slab
     int input_fraction = 0;
+    bool keeps_exact = true;  // unrounded values beside the words: what Real reads of a wire that is not rounded
 };
 
 /// The entries in words.  Throws InputError for formats that cannot hold them.

@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace squint {
 
 ClassificationMethod build_method(const ClassificationInputs& inputs) {
@@ -24,6 +26,42 @@ ClassificationMethod build_method(const ClassificationInputs& inputs) {
             return build_moment_series(inputs);
     }
     throw InputError(fmt::format("classification.method: {} is not known", name_of(inputs.settings.method)));
+}
+
+namespace {
+
+struct CollectTables {
+    std::vector<Table*>& tables;
+    void operator()(Table& t) const { tables.push_back(&t); }
+    void operator()(CellTable&) const {}  // fills in its own, when asked
+    void operator()(Rescale&) const {}
+};
+template <class M>
+std::vector<Table*> tables_of(M& method) {
+    std::vector<Table*> tables;
+    method.visit(CollectTables{tables});
+    return tables;
+}
+template <class M, class N>
+void share_tables(M& method, N&& built) {
+    const std::vector<Table*> to = tables_of(method), from = tables_of(built);
+    for (std::size_t i = 0; i < from.size(); ++i) to[i]->share(*from[i]);
+}
+
+}  // namespace
+
+void need_exact(ClassificationMethod& method, ClassificationInputs inputs) {
+    inputs.keeps_exact = true;
+    const auto build = [&](auto& m) {
+        const std::vector<Table*> tables = tables_of(m);
+        if (std::all_of(tables.begin(), tables.end(), [](const Table* t) { return t->has_exact(); })) return;
+        using M = std::decay_t<decltype(m)>;
+        if constexpr (std::is_same_v<M, PreIntegrated2D>)
+            share_tables(m.prefix, build_prefix_lookup(inputs));
+        else
+            share_tables(m, std::get<M>(build_method(inputs)));
+    };
+    std::visit(build, method);
 }
 
 }  // namespace squint

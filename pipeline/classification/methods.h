@@ -36,5 +36,9 @@ int entry_reach(const M& method) {
 /// cannot have.
 ClassificationMethod build_method(const ClassificationInputs& inputs);
 
+/// Gives the tables of a method that was built from these inputs their unrounded values.  Other copies of the
+/// method keep theirs.
+void need_exact(ClassificationMethod& method, ClassificationInputs inputs);
+
 }  // namespace squint
 #endif

@@ -1,6 +1,7 @@
 #include "pipeline/classification/moments.h"
 
 #include "core/error.h"
+#include "pipeline/classification/moment_rows.h"
 #include "pipeline/preintegration/leg.h"
 #include "pipeline/preintegration/pips.h"
 
@@ -9,6 +10,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <memory>
+#include <utility>
 
 namespace squint {
 namespace {
@@ -36,15 +39,11 @@ std::vector<Step> steps_of(const Entries& entries) {
     return steps;
 }
 
-/// Fills the block of 2^(level + 1) steps from `start` on, in units of its own depth's power of two.
-void fill_block(MomentSeries& m, const std::vector<Step>& steps, int row, int start, int length,
+/// Fills the block of `length` steps from `start` on, in units of its own depth's power of two:
+/// write_moment_rows for any rounding, with the exact values.
+void fill_block(MomentSeries& m, const std::vector<Step>& steps, int row, int start, int length, double unit,
                 const Spec& spec) {
     const int end = std::min<int>(start + length, static_cast<int>(steps.size()));
-    double total = 0;
-    for (int i = start; i < end; ++i) total += steps[static_cast<std::size_t>(i)].depth;
-    int exponent = 0;
-    std::frexp(total, &exponent);
-    const double unit = std::ldexp(1.0, -exponent);
     double depth = 0;
     std::array<std::array<double, 3>, kMostMomentOrder> moment{};
     const auto put = [&](int at) {
@@ -71,27 +70,104 @@ void fill_block(MomentSeries& m, const std::vector<Step>& steps, int row, int st
     }
 }
 
-void fill_moments(MomentSeries& m, const Entries& fine, const Spec& spec) {
+/// The power of two that a block's depth lies below, by halves of it: blocks of a level are sums of two of
+/// the level below, and only where a sum's last bits decide are its steps added one by one, as the rows are.
+class BlockUnits {
+  public:
+    explicit BlockUnits(const std::vector<Step>& steps) : steps_(steps), sums_(steps.size() + 2) {
+        for (std::size_t i = 0; i < sums_.size(); ++i) sums_[i] = depth(i) + depth(i + 1);
+    }
+    double unit(int level, int block) const {
+        const double sum = sums_[static_cast<std::size_t>(block)];
+        int exponent = 0, above = 0;
+        std::frexp(sum * (1 - 0x1p-40), &exponent), std::frexp(sum * (1 + 0x1p-40), &above);
+        if (exponent != above) std::frexp(one_by_one(block << level, 2 << level), &exponent);
+        return std::ldexp(1.0, -exponent);
+    }
+    void next_level() {
+        for (std::size_t b = 0; 2 * b < sums_.size(); ++b)
+            sums_[b] = sums_[2 * b] + (2 * b + 2 < sums_.size() ? sums_[2 * b + 2] : 0);
+        sums_.resize((sums_.size() + 1) / 2);
+    }
+
+  private:
+    double depth(std::size_t i) const { return i < steps_.size() ? steps_[i].depth : 0; }
+    double one_by_one(int start, int length) const {
+        double total = 0;
+        for (int i = start; i < start + length; ++i) total += depth(static_cast<std::size_t>(i));
+        return total;
+    }
+    const std::vector<Step>& steps_;
+    std::vector<double> sums_;
+};
+
+/// Steps as vectors take them.
+MomentSteps side_by_side(const std::vector<Step>& steps, int order) {
+    MomentSteps result{
+        order, static_cast<int>(steps.size()), 1 + 3 * order <= 8 ? 8 : MomentSteps::kPadded, {}};
+    result.number.resize(steps.size() * static_cast<std::size_t>(result.padded));
+    double* to = result.number.data();
+    for (const Step& step : steps) {
+        to[0] = step.depth;
+        for (int k = 0; k < order; ++k) std::copy(step.light.begin(), step.light.end(), to + 1 + 3 * k);
+        to += result.padded;
+    }
+    return result;
+}
+
+int level_count(int steps) {
+    return static_cast<int>(std::bit_width(static_cast<unsigned>(steps - 1))) + 1;
+}
+/// Rows of all blocks of a level.
+int level_rows(int steps, int level) {
+    return (steps / (1 << level) + 1) * ((2 << level) + 1);
+}
+std::int64_t all_rows(int steps) {
+    std::int64_t rows = 0;
+    for (int l = 0; l < level_count(steps); ++l) rows += level_rows(steps, l);
+    return rows;
+}
+
+void fill_moments(MomentSeries& m, const Entries& fine, const Spec& spec, bool keeps_exact) {
     const std::vector<Step> steps = steps_of(fine);
-    const int count = static_cast<int>(steps.size());
-    const int levels = static_cast<int>(std::bit_width(static_cast<unsigned>(count - 1))) + 1;
+    const int count = static_cast<int>(steps.size()), columns = 1 + 3 * m.order;
+    const int levels = level_count(count);
     m.levels = Table(levels, 1);
     int rows = 0;
     for (int l = 0; l < levels; ++l) {
         m.levels.set_raw(l, 0, rows);
-        rows += (count / (1 << l) + 1) * ((2 << l) + 1);
+        rows += level_rows(count, l);
     }
-    if (std::int64_t{rows} * (1 + 3 * m.order) > kMostValues)
+    if (std::int64_t{rows} * columns > kMostValues)
         throw InputError(fmt::format(
             "classification.order: moments of order {} over {} entries take {} MiB of words, and {} are "
             "allowed: take pips of order 1, or fewer transfer_function.entries",
-            m.order, fine.size(), std::int64_t{rows} * (1 + 3 * m.order) >> 18, kMostValues >> 18));
-    m.moments = Table(rows, 1 + 3 * m.order);
-    for (int l = 0; l < levels; ++l)
+            m.order, fine.size(), std::int64_t{rows} * columns >> 18, kMostValues >> 18));
+    m.moments = Table(rows, columns, keeps_exact);
+    const bool in_vectors = !keeps_exact && spec.rounding == Rounding::rnd_conv;
+    const MomentSteps many = in_vectors ? side_by_side(steps, m.order) : MomentSteps{};
+    std::unique_ptr<std::int32_t[]> words;
+    if (in_vectors)
+        words = std::make_unique_for_overwrite<std::int32_t[]>(static_cast<std::size_t>(rows * columns) +
+                                                               MomentSteps::kPadded);
+    BlockUnits units(steps);
+    std::size_t row = 0;
+    for (int l = 0; l < levels; ++l, units.next_level())
         for (int block = 0; block <= count >> l; ++block) {
-            const int row = static_cast<int>(m.levels.word(l, 0)) + block * ((2 << l) + 1);
-            fill_block(m, steps, row, block << l, 2 << l, spec);
+            const int length = 2 << l, start = block << l, end = std::min(start + length, count);
+            const double unit = units.unit(l, block);
+            if (in_vectors) {
+                std::int32_t* const first = words.get() + row * static_cast<std::size_t>(columns);
+                write_moment_rows(many, start, end, unit, spec.format.fraction_bits, first);
+                std::int32_t* const last = first + (end - start) * columns;
+                for (int i = columns; i < (start + length - end + 1) * columns; ++i)
+                    last[i] = last[i - columns];
+            } else {
+                fill_block(m, steps, static_cast<int>(row), start, length, unit, spec);
+            }
+            row += static_cast<std::size_t>(length) + 1;
         }
+    if (in_vectors) m.moments.take(std::move(words));
 }
 
 /// g_j(x), j >= 1: what L_j is multiplied with for the straight colour.
@@ -115,17 +191,42 @@ double power_series_weight(int order, int j, double x) {
     return above / below;
 }
 
+Table computed_weights(int order, bool legendre, double deepest, int row_bits, const Spec& spec) {
+    const int rows = static_cast<int>(std::ceil(std::ldexp(deepest, row_bits))) + 2;
+    Table weights(rows, order - 1);
+    weights.wire = static_cast<int>(Wire::slab_ratio);
+    for (int i = 0; i < rows; ++i) {
+        const double x = std::ldexp(i, -row_bits);
+        for (int j = 1; j < order; ++j)
+            weights.set(i, j - 1,
+                        legendre ? legendre_weight_over_opacity(j, x) : power_series_weight(order, j, x),
+                        spec);
+    }
+    return weights;
+}
+
 void fill_weights(MomentSeries& m, bool legendre, double deepest) {
     const Spec spec{{5, m.weight_fraction, true}, Rounding::rnd_conv, Overflow::sat};
-    const int rows = static_cast<int>(std::ceil(std::ldexp(deepest, m.row_bits))) + 2;
-    m.weights = Table(rows, m.order - 1);
-    m.weights.wire = static_cast<int>(Wire::slab_ratio);
-    for (int i = 0; i < rows; ++i) {
-        const double x = std::ldexp(i, -m.row_bits);
-        for (int j = 1; j < m.order; ++j)
-            m.weights.set(i, j - 1,
-                          legendre ? legendre_weight_over_opacity(j, x) : power_series_weight(m.order, j, x),
-                          spec);
+    // They know nothing of the transfer function, and copies share their rows: the last few are kept.
+    struct Kept {
+        int order, row_bits;
+        bool legendre;
+        double deepest;
+        Spec spec;
+        Table weights;
+    };
+    static thread_local std::vector<Kept> kept;
+    const auto found = std::find_if(kept.begin(), kept.end(), [&](const Kept& k) {
+        return k.order == m.order && k.row_bits == m.row_bits && k.legendre == legendre &&
+               k.deepest == deepest && k.spec == spec;
+    });
+    if (found == kept.end()) {
+        if (kept.size() == 4) kept.erase(kept.begin());
+        kept.push_back({m.order, m.row_bits, legendre, deepest, spec,
+                        computed_weights(m.order, legendre, deepest, m.row_bits, spec)});
+        m.weights = kept.back().weights;
+    } else {
+        m.weights = found->weights;
     }
     m.to_weight = Rescale(m.weight_fraction + m.depth_fraction - m.row_bits, spec);
 }
@@ -161,15 +262,21 @@ MomentSeries build_moment_series(const ClassificationInputs& in) {
     const double deepest = preintegration::deepest_entry(in.entries, in.step_world);
     const int wanted = deepest <= 1 ? 0 : deepest <= 8 ? 2 : 3;
     m.sub_entry_bits = std::min(std::max(wanted, sub_entry_bits_for_color(in, kMostRows)), in.input_fraction);
-    while (m.sub_entry_bits > 0 && in.entries.size() << m.sub_entry_bits > kMostRows) --m.sub_entry_bits;
-    const Entries fine =
-        m.sub_entry_bits ? preintegration::subdivided(in.entries, 1 << m.sub_entry_bits) : in.entries;
+    const auto too_many = [&] {
+        const int steps = (in.entries.size() - 1) << m.sub_entry_bits;
+        return in.entries.size() << m.sub_entry_bits > kMostRows ||
+               all_rows(steps) * (1 + 3 * m.order) > kMostValues;
+    };
+    while (m.sub_entry_bits > 0 && too_many()) --m.sub_entry_bits;
+    Entries between;
+    if (m.sub_entry_bits) between = preintegration::subdivided(in.entries, 1 << m.sub_entry_bits);
+    const Entries& fine = m.sub_entry_bits ? between : in.entries;
 
     // Words of the moments: as many bits as the wire has, at most 28, so that products fit 64-bit lanes.
     const int wire = static_cast<int>(Wire::table_moment);
     m.word_fraction = std::clamp(moment.format.integer_bits + moment.format.fraction_bits, 8, 28);
     const Spec word{{1, m.word_fraction, false}, moment.rounding, Overflow::sat};
-    fill_moments(m, fine, word);
+    fill_moments(m, fine, word, in.keeps_exact);
     m.moments.wire = wire;
     m.resolved = std::int64_t{1} << (m.word_fraction - std::max(0, m.word_fraction - 10) / m.order);
     m.to_part = Rescale(m.word_fraction + in.input_fraction - m.sub_entry_bits, word, wire);

@@ -15,14 +15,16 @@ PreIntegrated1D build_pre_integrated_1d(const ClassificationInputs& in) {
     const Spec sum = in.specs[Wire::table_moment];
     require_range(in.specs, Wire::table_moment, tables.sum.back(),
                   "the prefix sums of the entries' opacities");
-    m.sums = Table(in.entries.size(), PreIntegrated1D::columns);
+    m.sums = Table(in.entries.size(), PreIntegrated1D::columns, in.keeps_exact);
     m.sums.wire = static_cast<int>(Wire::table_moment);
-    for (int i = 0; i < in.entries.size(); ++i) {
-        const auto at = static_cast<std::size_t>(i);
-        for (int c = 0; c < 3; ++c)
-            m.sums.set(i, c, tables.colored_sum[static_cast<std::size_t>(c)][at], sum);
-        m.sums.set(i, PreIntegrated1D::value, tables.sum[at], sum);
-    }
+    static_assert(PreIntegrated1D::value == 3 && PreIntegrated1D::columns == 4);
+    std::vector<double> sums;
+    sums.reserve(tables.sum.size() * 4);
+    for (std::size_t i = 0; i < tables.sum.size(); ++i)
+        for (const std::vector<double>* column :
+             {&tables.colored_sum[0], &tables.colored_sum[1], &tables.colored_sum[2], &tables.sum})
+            sums.push_back((*column)[i]);
+    m.sums.fill(sums, std::array{sum, sum, sum, sum});
     const int mean =
         sum.format.fraction_bits;  // of a sum with input_fraction bits more over a span with them
     const auto to = [&](Wire wire) { return Rescale(mean, in.specs[wire], static_cast<int>(wire)); };

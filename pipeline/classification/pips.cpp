@@ -2,6 +2,7 @@
 
 #include "pipeline/preintegration/prefix_tables.h"
 
+#include <array>
 #include <cmath>
 
 namespace squint {
@@ -12,16 +13,21 @@ PowerSeriesOfOrder1 build_power_series_of_order_1(const ClassificationInputs& in
     const int bits = sub_entry_bits_for_color(in, kMostRows);
     m.prefix = build_prefix_lookup(in, bits);
     const Spec moment = in.specs[Wire::table_moment], ratio = in.specs[Wire::slab_ratio];
-    const preintegration::PrefixTables tables = preintegration::build_prefix_tables(
-        bits ? preintegration::subdivided(in.entries, 1 << bits) : in.entries, 1);
+    Entries between;
+    if (bits) between = preintegration::subdivided(in.entries, 1 << bits);
+    const std::vector<Entry>& entry = bits ? between.entry : in.entries.entry;
     const double step = std::ldexp(in.step_world, -bits);
-    m.moment = Table(tables.size(), 3);
+    std::vector<double> sums(entry.size() * 3);
+    Vec3 sum{0, 0, 0};
+    for (std::size_t i = 0; i + 1 < entry.size(); ++i)
+        for (int c = 0; c < 3; ++c) {
+            sum[c] += preintegration::colored_depth(entry[i].color[c], entry[i].extinction,
+                                                    entry[i + 1].color[c], entry[i + 1].extinction);
+            sums[3 * (i + 1) + static_cast<std::size_t>(c)] = sum[c] * step;
+        }
+    m.moment = Table(static_cast<int>(entry.size()), 3, in.keeps_exact);
     m.moment.wire = static_cast<int>(Wire::table_moment);
-    for (int c = 0; c < 3; ++c)
-        for (int i = 0; i < tables.size(); ++i)
-            m.moment.set(i, c,
-                         tables.moment[0][static_cast<std::size_t>(c)][static_cast<std::size_t>(i)] * step,
-                         moment);
+    m.moment.fill(sums, std::array{moment, moment, moment});
     m.to_ratio = Rescale(moment.format.fraction_bits - in.specs[Wire::table_extinction].format.fraction_bits,
                          ratio, static_cast<int>(Wire::slab_ratio));
     m.to_ratio.divides = true;

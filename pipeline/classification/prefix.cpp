@@ -4,6 +4,7 @@
 #include "pipeline/preintegration/opaque_prediction.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace squint {
@@ -17,7 +18,7 @@ constexpr double kStraightEnough = 1.0 / 255;
 }  // namespace
 
 int sub_entry_bits_for_color(const ClassificationInputs& in, int most_rows) {
-    double worst = 0;
+    double worst = kInsideEntry;  // and no less: one row is enough for that
     for (int i = 0; i + 1 < in.entries.size(); ++i) {
         const Entry &a = in.entries.entry[static_cast<std::size_t>(i)],
                     &b = in.entries.entry[static_cast<std::size_t>(i) + 1];
@@ -40,34 +41,35 @@ PrefixLookup build_prefix_lookup(const ClassificationInputs& in, int sub_entry_b
     p.entries = build_entry_lookup(in);
     const Spec extinction = in.specs[Wire::table_extinction], depth = in.specs[Wire::slab_depth];
     const int n = in.entries.size();
-    const Entries fine =
-        sub_entry_bits ? preintegration::subdivided(in.entries, 1 << sub_entry_bits) : in.entries;
+    Entries between;
+    if (sub_entry_bits) between = preintegration::subdivided(in.entries, 1 << sub_entry_bits);
+    const Entries& fine = sub_entry_bits ? between : in.entries;
     const double step = std::ldexp(in.step_world, -sub_entry_bits);
     const int rows = fine.size();
     p.sub_entry_bits = sub_entry_bits;
-    double total = 0, bend = 0;
-    for (int i = 0; i + 1 < rows; ++i) {
-        const double a = fine.entry[static_cast<std::size_t>(i)].extinction,
-                     b = fine.entry[static_cast<std::size_t>(i) + 1].extinction;
-        total += 0.5 * (a + b), bend = std::max(bend, std::abs(b - a));
-    }
+    double bend = 0;
+    for (int i = 0; i + 1 < rows; ++i)
+        bend = std::max(bend, std::abs(fine.entry[static_cast<std::size_t>(i) + 1].extinction -
+                                       fine.entry[static_cast<std::size_t>(i)].extinction));
     p.curved = bend * in.step_world > kStraightEnough && p.place_bits() > 0;
-    require_range(in.specs, Wire::table_extinction, total * step,
+    const std::size_t columns = p.curved ? 2 : 1;
+    std::vector<double> depths(static_cast<std::size_t>(rows) * columns);
+    double sum = 0;  // trapezoids: exact for a linear extinction
+    for (std::size_t i = 0; i + 1 < static_cast<std::size_t>(rows); ++i) {
+        const double a = fine.entry[i].extinction, b = fine.entry[i + 1].extinction;
+        if (p.curved) depths[i * columns + 1] = (b - a) * step;
+        sum += 0.5 * (a + b);
+        depths[(i + 1) * columns] = sum * step;
+    }
+    require_range(in.specs, Wire::table_extinction, sum * step,
                   "the prefix sums of the entries' optical depths");
-    p.depth = Table(rows, p.curved ? 2 : 1);
+    p.depth = Table(rows, static_cast<int>(columns), in.keeps_exact);
     p.depth.wire = static_cast<int>(Wire::table_extinction);
     Spec signed_extinction = extinction;
     signed_extinction.format.is_signed = true;
-    double sum = 0;  // trapezoids: exact for a linear extinction
-    for (int i = 0; i < rows; ++i) {
-        p.depth.set(i, 0, sum * step, extinction);
-        p.total = p.depth.word(i, 0);
-        if (i + 1 == rows) break;
-        const double a = fine.entry[static_cast<std::size_t>(i)].extinction,
-                     b = fine.entry[static_cast<std::size_t>(i) + 1].extinction;
-        sum += 0.5 * (a + b);
-        if (p.curved) p.depth.set(i, 1, (b - a) * step, signed_extinction);
-    }
+    const std::array specs{extinction, signed_extinction};
+    p.depth.fill(depths, std::span(specs).first(columns));
+    p.total = p.depth.word(rows - 1, 0);
     const int wire = static_cast<int>(Wire::slab_depth);
     p.to_depth = Rescale(extinction.format.fraction_bits + p.gained_bits() - in.input_fraction, depth, wire);
     p.to_depth.divides = true;

@@ -159,9 +159,7 @@ struct Step {
           depth((t0 + t1) / 2),
           square(t0 * t0 / 3 + t0 * (t1 - t0) / 4 + (t1 - t0) * (t1 - t0) / 20) {}
 
-    double first(double c0, double c1) const {
-        return (2 * c0 * tau0 + 2 * c1 * tau1 + c0 * tau1 + c1 * tau0) / 6;
-    }
+    double first(double c0, double c1) const { return colored_depth(c0, tau0, c1, tau1); }
     /// 2 int c T dT with T = before + t; int u t dt by parts.
     double second(double c0, double c1, double before) const {
         return 2 * before * first(c0, c1) + c1 * depth * depth - (c1 - c0) * square;

@@ -29,6 +29,11 @@ struct Moments {
     void append(const Moments& behind, int count);
 };
 
+/// int c tau du over an entry along which both run linearly: X_1's step.
+inline double colored_depth(double c0, double tau0, double c1, double tau1) {
+    return (2 * c0 * tau0 + 2 * c1 * tau1 + c0 * tau1 + c1 * tau0) / 6;
+}
+
 struct PrefixTables {
     std::vector<double> depth;       // T[i]; T[0] = 0
     std::vector<double> extinction;  // tau[i]

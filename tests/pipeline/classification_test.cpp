@@ -126,8 +126,9 @@ TEST(ClassificationMethods, ColourIsNeverAboveOpacityNorBelowZero) {
                     const Int128 most = c.premultiplied ? slab.alpha * one_color / one_alpha : one_color;
                     for (const Int128 color : slab.color)
                         ASSERT_TRUE(0 <= color && color <= most)
-                            << method.name() << ' ' << preset << ' ' << function.name << ": " << to_double(color)
-                            << " of " << to_double(most) << ", " << s.front << " to " << s.back << ", " << steps;
+                            << method.name() << ' ' << preset << ' ' << function.name << ": "
+                            << to_double(color) << " of " << to_double(most) << ", " << s.front << " to "
+                            << s.back << ", " << steps;
                 }
             }
 }
@@ -183,6 +184,31 @@ TEST(ClassificationMethods, DefaultFormatsFitLanesForEightAndTwelveBits) {
             EXPECT_LE(needs.operand_bits, 32) << method.name() << ' ' << entries;
             EXPECT_LE(needs.lane_bits, 64) << method.name() << ' ' << entries;
         }
+}
+
+struct CollectWords {
+    std::vector<std::int64_t>& words;
+    void operator()(Table& t) const {
+        for (int i = 0; i < t.rows(); ++i)
+            for (int c = 0; c < t.columns(); ++c) words.push_back(t.word(i, c));
+    }
+    void operator()(CellTable&) const {}
+    void operator()(Rescale&) const {}
+};
+
+// Tables without their exact values are filled many words at a time: in the plan, and here first.
+TEST(ClassificationMethods, TablesHaveTheSameWordsWithAndWithoutTheirExactValues) {
+    for (const char* preset : {"default", "squeeze"})
+        for (const NamedEntries& function : functions())
+            for (const MethodCase& m : all_methods()) {
+                Classifier c = make_classifier(function.entries, m, preset);
+                ClassificationMethod plain =
+                    build_method({c.entries, c.specs, c.settings, 1, c.input_fraction, false});
+                std::vector<std::int64_t> one_by_one, many;
+                std::visit([&](auto& method) { method.visit(CollectWords{one_by_one}); }, c.method);
+                std::visit([&](auto& method) { method.visit(CollectWords{many}); }, plain);
+                ASSERT_EQ(many, one_by_one) << preset << ' ' << function.name << ' ' << m.name();
+            }
 }
 
 TEST(PreIntegrated2D, CellsOfSixteenBitsTakeEightBytes) {
