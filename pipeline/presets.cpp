@@ -84,7 +84,10 @@ WireSpecs standard(const PresetInputs& in) {
     const int depth = sum > 15 ? sum + 1 : std::min(20, 23 - in.depth_bits);
     w[Wire::table_extinction] = w[Wire::table_moment] =
         u(in.total_depth_bits, std::min(depth, clip(31 - in.total_depth_bits)), r);
-    w[Wire::slab_depth] = u(4, clip(sum + 3), up);
+    // A full step's depth, before a shorter slab takes its part of it: all of it must fit.  Deep steps take
+    // their integer bits from two spare fraction bits first, which 32-bit lanes multiply as before.
+    const int deep = std::max(4, in.depth_bits);
+    w[Wire::slab_depth] = u(deep, clip(std::max(sum + 7 - deep, sum + 1)), up);
     w[Wire::slab_ratio] = u(1, 15, up), w[Wire::slab_alpha] = w[Wire::slab_color] = u(1, sum, up);
     w[Wire::light] = s(1, 14, r), w[Wire::dot] = s(1, 15, r), w[Wire::power] = u(1, 15, r),
     w[Wire::material] = u(1, 14, r);
@@ -108,7 +111,7 @@ WireSpecs wide(const PresetInputs& in) {
     w[Wire::normal] = s(1, 20, r);
     w[Wire::classification_input] = u(in.entry_bits, std::min(18, 31 - in.entry_bits), r);
     w[Wire::table_extinction] = w[Wire::table_moment] = u(in.total_depth_bits, 24, r),
-    w[Wire::slab_depth] = u(5, 24, r);
+    w[Wire::slab_depth] = u(std::max(5, in.depth_bits), 24, r);
     for (const Wire wire :
          {Wire::table_color, Wire::table_alpha, Wire::slab_ratio, Wire::slab_alpha, Wire::slab_color,
           Wire::lit_color, Wire::contribution, Wire::color, Wire::transparency})
