@@ -16,7 +16,8 @@
 namespace squint {
 namespace {
 
-constexpr int kMostRows = 8192;  // sub-entries: above, the tables outgrow the caches by far
+constexpr int kMostRows = 8192;       // sub-entries: above, the tables outgrow the caches by far
+constexpr int kMostDeepRows = 32768;  // where an entry is deeper than 8: 2 rows err by 39 LSB8, 8 by 5
 constexpr std::int64_t kMostValues = 8 << 20;
 constexpr int kInverseBits = 24;
 
@@ -262,9 +263,10 @@ MomentSeries build_moment_series(const ClassificationInputs& in) {
     const double deepest = preintegration::deepest_entry(in.entries, in.step_world);
     const int wanted = deepest <= 1 ? 0 : deepest <= 8 ? 2 : 3;
     m.sub_entry_bits = std::min(std::max(wanted, sub_entry_bits_for_color(in, kMostRows)), in.input_fraction);
+    const int most_rows = wanted == 3 ? kMostDeepRows : kMostRows;
     const auto too_many = [&] {
         const int steps = (in.entries.size() - 1) << m.sub_entry_bits;
-        return in.entries.size() << m.sub_entry_bits > kMostRows ||
+        return in.entries.size() << m.sub_entry_bits > most_rows ||
                all_rows(steps) * (1 + 3 * m.order) > kMostValues;
     };
     while (m.sub_entry_bits > 0 && too_many()) --m.sub_entry_bits;
