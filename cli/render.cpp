@@ -92,7 +92,7 @@ std::string magnitudes(const WireStatistics& s, const Format& format) {
 
 std::string audit_text(const Plan& plan, const RenderStatistics& statistics) {
     std::vector<std::vector<std::string>> rows{
-        {"wire", "format", "count", "min", "max", "inexact", "saturated", "wrapped", "bits"}};
+        {"wire", "format", "count", "min", "max", "inexact", "to zero", "saturated", "wrapped", "bits"}};
     for (std::size_t w = 0; w < statistics.wires.size(); ++w) {
         const WireStatistics& s = statistics.wires[w];
         const Format& format = plan.specs.spec[w].format;
@@ -100,7 +100,8 @@ std::string audit_text(const Plan& plan, const RenderStatistics& statistics) {
             rows.push_back({std::string(kWireInfo[w].name), to_string(format), std::to_string(s.count),
                             fmt::format("{:.6g}", to_real(s.smallest, format)),
                             fmt::format("{:.6g}", to_real(s.largest, format)), share(s.inexact, s.count),
-                            share(s.saturated, s.count), share(s.wrapped, s.count), magnitudes(s, format)});
+                            share(s.underflowed, s.count), share(s.saturated, s.count),
+                            share(s.wrapped, s.count), magnitudes(s, format)});
     }
     return table_text(rows) +
            "bits: one place for each number of bits a value needs, from none to all of its format's; a digit "

@@ -17,6 +17,7 @@ struct TraceEvent {
 
 struct WireStatistics {
     std::int64_t count = 0, inexact = 0, saturated = 0, wrapped = 0;
+    std::int64_t underflowed = 0;  // not zero, and zero when rounded
     std::int64_t smallest = std::numeric_limits<std::int64_t>::max();
     std::int64_t largest = std::numeric_limits<std::int64_t>::min();
     std::array<std::int64_t, 64> magnitude{};  // [b]: values whose absolute raw value needs b bits
@@ -24,7 +25,7 @@ struct WireStatistics {
 
     void merge(const WireStatistics& other) {
         count += other.count, inexact += other.inexact, saturated += other.saturated,
-            wrapped += other.wrapped;
+            wrapped += other.wrapped, underflowed += other.underflowed;
         if (other.smallest < smallest) smallest = other.smallest;
         if (other.largest > largest) largest = other.largest;
         for (std::size_t b = 0; b < magnitude.size(); ++b) magnitude[b] += other.magnitude[b];

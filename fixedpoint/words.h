@@ -198,6 +198,7 @@ inline Audited record(Int128 rounded, bool inexact, double exact, const Rescale&
         const auto value = static_cast<std::int64_t>(raw);
         ++s->count;
         s->inexact += inexact;
+        s->underflowed += inexact && rounded == 0;
         if (raw != rounded) ++(to.wraps ? s->wrapped : s->saturated);
         s->smallest = std::min(s->smallest, value);
         s->largest = std::max(s->largest, value);

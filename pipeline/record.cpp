@@ -223,6 +223,7 @@ Json json_of_audit(const Plan& plan, const RenderStatistics& statistics) {
                                                 {"min", to_real(s.smallest, format)},
                                                 {"max", to_real(s.largest, format)},
                                                 {"inexact", s.inexact},
+                                                {"underflowed", s.underflowed},
                                                 {"saturated", s.saturated},
                                                 {"wrapped", s.wrapped},
                                                 {"magnitude_bits", magnitude}};

@@ -82,10 +82,15 @@ Json point_of(const Json& record) {
         if (record.contains(name)) p[name] = record[name];
     if (record.contains("audit"))
         for (const auto& [wire, a] : record["audit"].items())
-            p["audit"][wire] = {{"format", a["format"]},   {"count", a["count"]},
-                                {"min", a["min"]},         {"max", a["max"]},
-                                {"inexact", a["inexact"]}, {"saturated", a["saturated"]},
-                                {"wrapped", a["wrapped"]}, {"bits", a["magnitude_bits"]}};
+            p["audit"][wire] = {{"format", a["format"]},
+                                {"count", a["count"]},
+                                {"min", a["min"]},
+                                {"max", a["max"]},
+                                {"inexact", a["inexact"]},
+                                {"saturated", a["saturated"]},
+                                {"wrapped", a["wrapped"]},
+                                {"underflowed", a.value("underflowed", std::int64_t{0})},
+                                {"bits", a["magnitude_bits"]}};
     return p;
 }
 

@@ -143,6 +143,7 @@ TEST_F(Render, ReferenceIsMeasuredToo) {
 TEST_F(Render, AuditPrintsATableOfWires) {
     const Outcome r = squint("render" + kSmall + "--audit -q");
     EXPECT_EQ(r.code, 0) << r.err;
+    EXPECT_THAT(r.out, HasSubstr("to zero"));
     EXPECT_THAT(r.out, HasSubstr("saturated"));
     EXPECT_THAT(r.out, HasSubstr("transparency"));
     EXPECT_EQ(r.err, "");

@@ -61,6 +61,31 @@ TEST(Words, QuotientIsTheExactFractionRoundedOnce) {
     }
 }
 
+TEST(Audited, CountsRoundedUnderflownSaturatedAndWrappedValues) {
+    // From four fraction bits to u2.0: 0, 1/4 -> 0, 3/4 -> 1, 2, 5 -> 3, -1/4 -> 0, -3/4 -> -1 -> 0.
+    for (const Overflow overflow : {Overflow::sat, Overflow::wrap}) {
+        WireStatistics counted;
+        Rescale to(4, {{2, 0, false}, Rounding::rnd, overflow});
+        to.statistics = &counted;
+        for (const int x : {0, 4, 12, 32, 80, -4, -12}) quantise(Audited{x}, to);
+        EXPECT_EQ(counted.count, 7);
+        EXPECT_EQ(counted.inexact, 4);
+        EXPECT_EQ(counted.underflowed, 2) << "1/4 and -1/4; -3/4 became zero by a limit, not in rounding";
+        EXPECT_EQ(counted.saturated, overflow == Overflow::sat ? 2 : 0);
+        EXPECT_EQ(counted.wrapped, overflow == Overflow::wrap ? 2 : 0);
+        WireStatistics twice = counted;
+        twice.merge(counted);
+        EXPECT_EQ(twice.underflowed, 4);
+    }
+    // 1 / 5 to the nearest whole is not zero, and becomes it; 0 / 5 is.
+    WireStatistics counted;
+    Rescale to(0, {{2, 0, false}, Rounding::rnd, Overflow::sat});
+    to.statistics = &counted;
+    quotient(Audited{1}, Audited{5}, to);
+    quotient(Audited{0}, Audited{5}, to);
+    EXPECT_EQ(counted.underflowed, 1);
+}
+
 TEST(Words, ShiftByIsMultiplicationByAPowerOfTwoRoundedDown) {
     for (std::int64_t x = 0; x < 300; ++x)
         for (std::int64_t bits = -12; bits <= 12; ++bits)

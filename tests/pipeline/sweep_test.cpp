@@ -218,6 +218,9 @@ TEST(SweepPoint, CountsSamplesAtWhichTransparencyStuck) {
     EXPECT_EQ(record["stuck"]["stuck_samples"].get<int>(),
               record["stuck"]["visible_samples"].get<int>() - record["stuck"]["rays"].get<int>());
     EXPECT_EQ(record["audit"]["contribution"]["max_raw"], 0);
+    // Every w was something and became nothing; no C was anything to begin with.
+    EXPECT_EQ(record["audit"]["contribution"]["underflowed"], record["audit"]["contribution"]["count"]);
+    EXPECT_EQ(record["audit"]["color"]["underflowed"], 0);
 }
 
 // ------------------------------------------------------------------------------------------------ cost

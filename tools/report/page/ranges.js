@@ -11,12 +11,12 @@ function rangeOf([wire, a]) {
     return -F;
   };
   const used = a.bits.map((n, b) => n ? b : 0).filter(Boolean), over = a.saturated + a.wrapped;
-  const edge = a.bits[1] ?? 0; // half as much would have been rounded to zero, or nearly
+  const under = a.underflowed;
   return { wire, low: -F, high: +i, any: total > 0, q1: quantile(0.25) - 0.5, q3: quantile(0.75) + 0.5, middle: quantile(0.5),
     least: used.length ? Math.min(...used) - 1 - F : null, most: used.length ? Math.max(...used) - F : null,
-    over: percent(over, a.count), edge: percent(edge, a.count),
+    over: percent(over, a.count), under: percent(under, a.count),
     tip: { wire, format: a.format, values: `${number(a.min)} to ${number(a.max)}`, 'not zero': number(total), zero: number(a.bits[0] ?? 0), rounded: percent(a.inexact, a.count) || 'none',
-      overflow: over ? `${number(a.saturated)} saturated, ${number(a.wrapped)} wrapped of ${number(a.count)}` : 'none', 'a single last bit': edge ? number(edge) : 'none' } };
+      overflow: over ? `${number(a.saturated)} saturated, ${number(a.wrapped)} wrapped of ${number(a.count)}` : 'none', underflow: under ? `${number(under)} not zero became zero` : 'none' } };
 }
 
 let audits = null;
@@ -33,7 +33,7 @@ async function ranges() {
     { transform: any, mark: { type: 'rule', strokeWidth: 2, color: '#5d7bab' }, encoding: { x: x('least'), x2: { field: 'most' } } },
     { transform: any, mark: { type: 'bar', height: 10, color: '#6f97d6', stroke: kMark, strokeWidth: 1 }, encoding: { x: x('q1'), x2: { field: 'q3' } } },
     { transform: any, mark: { type: 'tick', thickness: 2.5, size: 12, color: kInk }, encoding: { x: x('middle') } },
-    ...[['over', 'high', kBad, 'left', 'triangle-left', 1], ['edge', 'low', kWarn, 'right', 'triangle-right', -1]].flatMap(([field, at, color, align, shape, way]) => [
+    ...[['over', 'high', kBad, 'left', 'triangle-left', 1], ['under', 'low', kWarn, 'right', 'triangle-right', -1]].flatMap(([field, at, color, align, shape, way]) => [
       { transform: [{ filter: `datum.${field} != ''` }], mark: { type: 'point', shape, filled: true, size: 110, color, opacity: 1 }, encoding: { x: x(at) } },
       { transform: [{ filter: `datum.${field} != ''` }], mark: { type: 'text', align, dx: 9 * way, fontSize: 11, fontWeight: 600, color }, encoding: { x: x(at), text: { field } } },
     ]),
