@@ -53,19 +53,20 @@ bool QuantiseRows(const double* HWY_RESTRICT values, std::size_t count, const do
 /// False where a word has more than 16 bits.
 bool PairRows(const std::int32_t* HWY_RESTRICT words, std::size_t count, std::int32_t* HWY_RESTRICT paired) {
     const hn::ScalableTag<std::int32_t> d;
+    const auto less = hn::Set(d, static_cast<std::int32_t>(0x80008000u));
     auto any = hn::Zero(d);
     std::size_t i = 0;
     for (; i + 4 + hn::Lanes(d) <= count; i += hn::Lanes(d)) {
         const auto here = hn::LoadU(d, words + i), next = hn::LoadU(d, words + i + 4);
         any = hn::Or(any, here);
-        hn::StoreU(hn::Or(here, hn::ShiftLeft<16>(next)), d, paired + i);
+        hn::StoreU(hn::Xor(hn::Or(here, hn::ShiftLeft<16>(next)), less), d, paired + i);
     }
     std::uint32_t rest = 0;
     for (; i < count; ++i) {
         const auto here = static_cast<std::uint32_t>(words[i]),
                    next = static_cast<std::uint32_t>(words[i + 4 < count ? i + 4 : i]);
         rest |= here;
-        paired[i] = static_cast<std::int32_t>(here | next << 16);
+        paired[i] = static_cast<std::int32_t>((here | next << 16) ^ 0x80008000u);
     }
     return hn::AllTrue(d, hn::Eq(hn::ShiftRight<16>(any), hn::Zero(d))) && rest >> 16 == 0;
 }

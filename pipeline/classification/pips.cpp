@@ -33,19 +33,22 @@ PowerSeriesOfOrder1 build_power_series_of_order_1(const ClassificationInputs& in
     m.to_ratio.divides = true;
     m.one_ratio = ratio.format.one();
     m.to_ratio.highest = std::min(m.to_ratio.highest, m.one_ratio);  // a mean of colours
-    for (int i = 0; i + 1 < m.moment.rows(); ++i) {
-        m.most_rise = std::max(m.most_rise, m.prefix.depth.word(i + 1, 0) - m.prefix.depth.word(i, 0));
-        for (int c = 0; c < 3; ++c)
-            m.most_rise = std::max(m.most_rise, m.moment.word(i + 1, c) - m.moment.word(i, c));
+    const std::int32_t *depth = m.prefix.depth.narrow(), *colored = m.moment.narrow();
+    const int stride = m.prefix.depth.columns(), n = m.moment.rows();
+    if (!depth || !colored) {  // no 32-bit lanes for such words
+        m.most_rise = m.prefix.total + 1;
+        return m;
     }
-    if (m.prefix.depth.narrow() && m.moment.narrow()) {
-        std::vector<std::int32_t> rows;
-        for (int i = 0; i < m.moment.rows(); ++i) {
-            rows.push_back(static_cast<std::int32_t>(m.prefix.depth.word(i, 0)));
-            for (int c = 0; c < 3; ++c) rows.push_back(static_cast<std::int32_t>(m.moment.word(i, c)));
-        }
-        m.rows = std::make_shared<const std::vector<std::int32_t>>(std::move(rows));
+    std::vector<std::int32_t> rows(static_cast<std::size_t>(4 * n));
+    std::int32_t most_rise = 0;
+    for (int i = 0; i < n; ++i) {
+        std::int32_t* row = rows.data() + 4 * i;
+        row[0] = depth[stride * i];
+        for (int c = 0; c < 3; ++c) row[1 + c] = colored[3 * i + c];
+        for (int c = 0; i > 0 && c < 4; ++c) most_rise = std::max(most_rise, row[c] - row[c - 4]);
     }
+    m.most_rise = most_rise;
+    m.rows = std::make_shared<const std::vector<std::int32_t>>(std::move(rows));
     return m;
 }
 
