@@ -48,13 +48,17 @@ TEST(Presets, WideKeepsNineBitsAndTheRaysOwnInTablesAndCompositing) {
 
 // CONVENTIONS.md: `default` rounds halves to even.  Interpolation rounds them up, so that a lerp seen from
 // its other end is the same number (MATH, C2.5; docs/decisions/0002).
-TEST(Presets, DefaultRoundsHalvesToEvenButInInterpolation) {
+// Interpolation and what tables give back, the input that asks them included: docs/decisions/0002.
+TEST(Presets, DefaultRoundsHalvesToEvenButInInterpolationAndLookups) {
     WireSpecs w;
     ASSERT_TRUE(preset_specs("default", {}, w));
     for (int i = 0; i < kWires; ++i) {
         const auto wire = static_cast<Wire>(i);
-        const bool lerp = wire == Wire::weight || info(wire).stage == "interpolation";
-        EXPECT_EQ(w[wire].rounding, lerp ? Rounding::rnd : Rounding::rnd_conv) << info(wire).name;
+        const bool stored = wire == Wire::table_color || wire == Wire::table_alpha ||
+                            wire == Wire::table_extinction || wire == Wire::table_moment;
+        const bool up = wire == Wire::weight || info(wire).stage == "interpolation" ||
+                        (info(wire).stage == "classification" && !stored);
+        EXPECT_EQ(w[wire].rounding, up ? Rounding::rnd : Rounding::rnd_conv) << info(wire).name;
     }
 }
 
