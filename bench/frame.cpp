@@ -89,10 +89,9 @@ const std::vector<std::string>& targets() {
 }
 
 double psnr_of(const Frame& frame, const Plan& plan, const Image& picture) {
-    static std::map<std::string, double> known;  // bits do not depend on the way, but float32's do
-    const std::string key = fmt::format("{} {} {} {} {}", frame.scene, frame.lit, frame.step,
-                                        frame.method.name, frame.options.as_float) +
-                            std::to_string(frame.size);
+    static std::map<std::string, double> known;  // bits do not depend on the way
+    const std::string key =
+        fmt::format("{} {} {} {} {}", frame.scene, frame.lit, frame.step, frame.method.name, frame.size);
     constexpr int kEvery = 8;
     const auto found = known.find(key);
     if (found != known.end()) return found->second;
@@ -153,16 +152,6 @@ void check_bits() {
         }
 }
 
-/// True when RenderOptions::as_float is more than a promise: its bits are never those of fixed point.
-bool find_float() {
-    const Scene scene = phantom_scene(24, false);
-    const Plan plan = make_plan(scene, volume_of(scene));
-    RenderOptions options = with(1);
-    const std::string fixed = picture_hash(render(plan, options).image);
-    options.as_float = true;
-    return picture_hash(render(plan, options).image) != fixed;
-}
-
 std::vector<Frame> frames_of(const std::string& scene) {
     std::vector<Frame> frames;
     for (const bool lit : {false, true}) {
@@ -197,12 +186,6 @@ std::vector<Frame> frames_of(const std::string& scene) {
         frames.push_back(frame);
         frame.way = "lanes_200x200", frame.options = with(1, "", false);
         frames.push_back(frame);
-        static const bool has_float = find_float();
-        if (has_float) {
-            frame = plain, frame.way = "float32_no_skipping", frame.options = with(1, "", false);
-            frame.options.as_float = true;
-            frames.push_back(frame);
-        }
     }
     return frames;
 }

@@ -21,10 +21,9 @@ struct RenderOptions {
     std::string target;  // SIMD target by name ("AVX3", "AVX2", "SSE4", "EMU128"); empty: the best there is
     LayoutRule layout = LayoutRule::automatic;
     std::int64_t layout_bytes =
-        -1;                 // room for a layout beside the volume itself; below 0: half of what is free
-    bool skip = true;       // leave out empty space
-    bool audit = false;     // count what every wire carried; runs the audited model
-    bool as_float = false;  // lanes of float32: the honest comparison, never the same bits
+        -1;              // room for a layout beside the volume itself; below 0: half of what is free
+    bool skip = true;    // leave out empty space
+    bool audit = false;  // count what every wire carried; runs the audited model
     std::function<void(double)> progress;  // called with the part done, from any thread
     const std::atomic<bool>* cancelled = nullptr;
 };
