@@ -74,10 +74,10 @@ template <class W>
 HWY_INLINE PrefixSample<W> sample_of(const PowerSeriesOfOrder1& m, W input) {
     PrefixSample<W> s{input, sub_entry_position(m.prefix.entries, m.prefix.sub_entry_bits, input), {}, {}};
     s.at.fraction = within(s.at.fraction, 0, std::int64_t{1} << m.prefix.place_bits());
-    const auto [here, next] = prefix_rows(m, s.at.entry);
-    s.sums = here;
+    const std::array<std::array<W, 4>, 2> rows = prefix_rows(m, s.at.entry);
+    s.sums = rows[0];
     const auto rise = [&](std::size_t c)
-                          SQUINT_WRITTEN_OUT { return within(next[c] - here[c], 0, m.most_rise); };
+                          SQUINT_WRITTEN_OUT { return within(rows[1][c] - rows[0][c], 0, m.most_rise); };
     s.rises = {rise(0), rise(1), rise(2), rise(3)};
     return s;
 }
