@@ -579,7 +579,7 @@ template <KnownRescales K>
 HWY_INLINE Lanes<std::int32_t, K> narrow(const WideLanes<K>& x) {
     const hn::ScalableTag<std::int32_t> d;
 #if HWY_TARGET == HWY_SCALAR
-    return {hn::Set(d, static_cast<std::int32_t>(hn::GetLane(x.low)))};
+    return {hn::DemoteTo(d, x.low)};  // saturates, as the vectors' does
 #else
     const hn::Half<decltype(d)> half;
     return {hn::Combine(d, hn::DemoteTo(half, x.high), hn::DemoteTo(half, x.low))};
@@ -613,7 +613,7 @@ template <KnownRescales K>
 HWY_INLINE WideLanes<K> widen(Lanes<std::int32_t, K> x) {
     const hn::ScalableTag<double> wide;
 #if HWY_TARGET == HWY_SCALAR
-    const auto only = hn::Set(wide, static_cast<double>(hn::GetLane(x.v)));
+    const auto only = hn::PromoteTo(wide, x.v);
     return {only, only};
 #else
     const hn::Half<hn::ScalableTag<std::int32_t>> half;

@@ -20,13 +20,14 @@ namespace {
 // The integers' overloads; those of lanes are found by their arguments.
 using squint::absolute, squint::affine, squint::bit_length, squint::blend, squint::clamp, squint::floor_shift,
     squint::gather, squint::max, squint::min, squint::quantise, squint::quotient, squint::select,
-    squint::shift_by, squint::shift_left, squint::vector_length;
+    squint::shift_by, squint::shift_left, squint::vector_length, squint::wide_product, squint::wide_sum,
+    squint::widen;
 
 /// Draws operands, runs one operation on lanes and on integers, and keeps the first difference of each.
-template <class T>
+template <class T, KnownRescales K = KnownRescales::nothing>
 class Comparison {
   public:
-    using L = Lanes<T>;
+    using L = Lanes<T, K>;
     static constexpr int kMost = 16;  // lanes of the widest target
 
     explicit Comparison(std::vector<std::string>& wrong) : wrong_(wrong) {}
@@ -63,8 +64,8 @@ class Comparison {
     std::mt19937_64 random_{7};
 };
 
-template <class T>
-Spec any_spec(Comparison<T>& compare) {
+template <class T, KnownRescales K>
+Spec any_spec(Comparison<T, K>& compare) {
     Spec spec{{static_cast<int>(compare.between(0, 24)), static_cast<int>(compare.between(0, 24)),
                compare.between(0, 1) == 1},
               static_cast<Rounding>(compare.between(0, 3)),
@@ -73,10 +74,10 @@ Spec any_spec(Comparison<T>& compare) {
     return spec;
 }
 
-template <class T>
-void compare_quantise(Comparison<T>& compare) {
+template <class T, KnownRescales K>
+void compare_quantise(Comparison<T, K>& compare) {
     const Spec spec = any_spec(compare);
-    const Rescale to(static_cast<int>(compare.between(0, 48)), spec);
+    Rescale to(static_cast<int>(compare.between(0, 48)), spec);
     // The plan gives a stage lanes that hold x, x + bias and the result.
     const int shift = to.shift, operand = 31 - std::max(-shift, 0);
     if (operand < 1 || (shift > 30 && sizeof(T) == 4 && (to.bias || to.to_zero))) return;
@@ -85,6 +86,11 @@ void compare_quantise(Comparison<T>& compare) {
     // An unsigned format that wraps negative numbers to more than 31 bits is refused by the lanes.
     const bool negative = to.lowest < 0 || !to.wraps || to.width <= 31;
     if (most < 1) return;
+    // What a kernel takes for granted must be so: where it leaves out the limits, no operand meets them.
+    const bool meets_limits =
+        round_off(negative ? -most : 0, to) < to.lowest || round_off(most, to) > to.highest;
+    to.limits = K != KnownRescales::halves_up || meets_limits;
+    if (!holds(K, to, 8 * sizeof(T))) return;
     compare(
         "quantise to " + to_string(spec) + " by " + std::to_string(shift),
         [&](int) { return std::min(std::max(compare.any(31, negative), negative ? -most : 0), most); },
@@ -151,15 +157,41 @@ void compare_quotients(Comparison<T>& compare) {
         [&](auto x, auto y, auto) { return quotient(x, y, to); });
 }
 
+/// Quotients of numbers wider than 32 bits.
+template <class T>
+void compare_wide(Comparison<T>& compare) {
+    Spec spec = any_spec(compare);
+    spec.overflow = Overflow::sat;
+    spec.format = {static_cast<int>(compare.between(1, 6)), static_cast<int>(compare.between(0, 16)), false};
+    const int gained = static_cast<int>(compare.between(0, 10)),
+              bits = static_cast<int>(compare.between(0, 8));
+    const Rescale to(spec.format.fraction_bits - gained, spec);
+    // Small denominators are met by many ties.
+    const int most = compare.between(0, 1) ? 30 : 4;
+    const auto draw = [&](int i) { return i == 2 ? 1 + compare.any(most - 1, false) : compare.any(30); };
+    compare("wide over wide to " + to_string(spec), draw, [&](auto x, auto y, auto z) {
+        return quotient(absolute(wide_sum(x, bits, y)), absolute(wide_sum(z, bits, z)), to);
+    });
+    compare("wide over narrow to " + to_string(spec), draw,
+            [&](auto x, auto y, auto z) { return quotient(absolute(wide_sum(x, bits, y)), widen(z), to); });
+    compare(
+        "product over wide to " + to_string(spec),
+        [&](int i) { return i == 2 ? 1 + compare.any(most - 1, false) : compare.any(20); },
+        [&](auto x, auto y, auto z) { return quotient(absolute(wide_product(x, y)), widen(z), to); });
+}
+
 template <class T>
 void compare_words(std::vector<std::string>& wrong) {
     Comparison<T> compare(wrong);
+    Comparison<T, KnownRescales::halves_to_even> known_even(wrong);
+    Comparison<T, KnownRescales::halves_up> known_up(wrong);
     Table table(200, 3);
     for (int i = 0; i < 200; ++i)
         for (int c = 0; c < 3; ++c) table.set_raw(i, c, compare.any(31));
     for (int round = 0; round < 4000 && wrong.size() < 4; ++round) {
         compare_arithmetic(compare), compare_quantise(compare), compare_quotients(compare);
-        compare_tables(compare, table);
+        compare_tables(compare, table), compare_wide(compare);
+        compare_quantise(known_even), compare_quantise(known_up);
     }
     for (int round = 0; round < 4000 && wrong.size() < 4; ++round) {
         const int guard = static_cast<int>(compare.between(0, 9));
