@@ -5,7 +5,8 @@
 #define HWY_TARGET_INCLUDE "pipeline/lanes/kernels_classification.cpp"
 #include <hwy/foreach_target.h>
 
-#include "fixedpoint/lanes.h"
+#include "fixedpoint/lane_quotients.h"
+#include "fixedpoint/lane_tables.h"
 #include "pipeline/classification/methods.h"
 #include "pipeline/lanes/kernels.h"
 

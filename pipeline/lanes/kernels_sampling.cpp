@@ -5,7 +5,7 @@
 #define HWY_TARGET_INCLUDE "pipeline/lanes/kernels_sampling.cpp"
 #include <hwy/foreach_target.h>
 
-#include "fixedpoint/lanes.h"
+#include "fixedpoint/lane_tables.h"
 #include "pipeline/classification/entries.h"
 #include "pipeline/interpolation.h"
 #include "pipeline/lanes/kernels.h"

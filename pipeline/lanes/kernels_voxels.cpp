@@ -6,7 +6,7 @@
 #define HWY_TARGET_INCLUDE "pipeline/lanes/kernels_voxels.cpp"
 #include <hwy/foreach_target.h>
 
-#include "fixedpoint/lanes.h"
+#include "fixedpoint/lane_tables.h"
 #include "pipeline/lanes/kernels.h"
 
 #include <algorithm>

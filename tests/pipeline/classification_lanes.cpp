@@ -1,5 +1,6 @@
 // Lanes of the build's own SIMD target, for classification_test.cpp.
-#include "fixedpoint/lanes.h"
+#include "fixedpoint/lane_quotients.h"
+#include "fixedpoint/lane_tables.h"
 #include "pipeline/classification/methods.h"
 
 #include <array>

@@ -1,12 +1,13 @@
-// Lanes equal the model word for word: every operation of fixedpoint/lanes.h on every SIMD target, 32 and 64
-// bits, against the integer words of fixedpoint/words.h.
+// Lanes equal the model word for word: every operation of fixedpoint/lanes.h, lane_tables.h and
+// lane_quotients.h on every SIMD target, 32 and 64 bits, against the integer words of fixedpoint/words.h.
 #include "pipeline/lanes/targets.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tests/pipeline/lane_words_test.cpp"
 #include <hwy/foreach_target.h>
 
-#include "fixedpoint/lanes.h"
+#include "fixedpoint/lane_quotients.h"
+#include "fixedpoint/lane_tables.h"
 #include "fixedpoint/words.h"
 
 #include <random>

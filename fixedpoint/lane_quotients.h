@@ -1,0 +1,265 @@
+// Quotients and roots of lanes, and their wide numbers: estimates in floating point, corrected in integers,
+// so that they have the same bits as the model's on every CPU.
+#if defined(SQUINT_FIXEDPOINT_LANE_QUOTIENTS_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_FIXEDPOINT_LANE_QUOTIENTS_H
+#undef SQUINT_FIXEDPOINT_LANE_QUOTIENTS_H
+#else
+#define SQUINT_FIXEDPOINT_LANE_QUOTIENTS_H
+#endif
+
+#include "fixedpoint/lanes.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+
+namespace lanes_detail {
+template <class T>
+using FloatOf = std::conditional_t<sizeof(T) == 4, float, double>;
+template <class T, KnownRescales K>
+HWY_INLINE auto to_floats(Lanes<T, K> x) {
+    return hn::ConvertTo(hn::ScalableTag<FloatOf<T>>(), x.v);
+}
+}  // namespace lanes_detail
+
+/// Bits of x >= 0: the exponent of x with every bit below a set one cleared, which no rounding carries into
+/// the next power.
+template <class T, KnownRescales K>
+HWY_INLINE Lanes<T, K> bit_length(Lanes<T, K> x) {
+    const hn::ScalableTag<T> d;
+    constexpr int kMantissa = sizeof(T) == 4 ? 23 : 52;
+    constexpr int kBias = sizeof(T) == 4 ? 126 : 1022;
+    const Lanes<T, K> leading{hn::AndNot(hn::ShiftRight<1>(x.v), x.v)};
+    const auto exponent = hn::ShiftRight<kMantissa>(hn::BitCast(d, lanes_detail::to_floats(leading)));
+    return {
+        hn::IfThenZeroElse(hn::Eq(x.v, hn::Zero(d)), hn::Sub(exponent, hn::Set(d, static_cast<T>(kBias))))};
+}
+/// x 2^bits, floor; x >= 0.
+template <class T, KnownRescales K>
+HWY_INLINE Lanes<T, K> shift_by(Lanes<T, K> x, Lanes<T, K> bits) {
+    using U = std::make_unsigned_t<T>;
+    const hn::ScalableTag<U> du;
+    const hn::ScalableTag<T> d;
+    const auto zero = hn::Zero(d);
+    const auto left = hn::BitCast(du, hn::Max(bits.v, zero)),
+               right = hn::BitCast(du, hn::Max(hn::Sub(zero, bits.v), zero));
+    return {hn::BitCast(d, hn::Shr(hn::Shl(hn::BitCast(du, x.v), left), right))};
+}
+/// See words.h: the root in double precision has the right floor.
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int64_t, K> vector_length(const std::array<Lanes<std::int64_t, K>, 3>& v, int guard) {
+    const hn::ScalableTag<std::int64_t> d;
+    const auto squares = shift_left(v[0] * v[0] + v[1] * v[1] + v[2] * v[2], 2 * guard);
+    return {hn::ConvertTo(d, hn::Sqrt(lanes_detail::to_floats(squares)))};
+}
+/// The sum of squares fills 32 bits, unsigned; its root is taken in doubles, half the lanes at a time.
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int32_t, K> vector_length(const std::array<Lanes<std::int32_t, K>, 3>& v, int guard) {
+    const hn::ScalableTag<std::int32_t> d;
+    const auto squares = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).v;
+    const double factor = power_of_two<double>(2 * guard);
+#if HWY_TARGET == HWY_SCALAR
+    const auto sum = static_cast<std::uint32_t>(hn::GetLane(squares));
+    return {hn::Set(d, static_cast<std::int32_t>(std::sqrt(factor * static_cast<double>(sum))))};
+#else
+    const hn::Half<decltype(d)> half;
+    const hn::ScalableTag<double> wide;
+    const auto root = [&](auto part) {
+        // Unsigned to double: the sign's weight is put right.
+        const auto x = hn::PromoteTo(wide, part);
+        const auto sum = hn::Add(x, hn::IfThenElseZero(hn::Lt(x, hn::Zero(wide)), hn::Set(wide, 0x1p32)));
+        return hn::DemoteTo(half, hn::Sqrt(hn::Mul(sum, hn::Set(wide, factor))));
+    };
+    return {hn::Combine(d, root(hn::UpperHalf(half, squares)), root(hn::LowerHalf(half, squares)))};
+#endif
+}
+
+/// The lowest bits of a product, whatever its factors: all 32 or 64 of them.
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int32_t, K> low_product(Lanes<std::int32_t, K> a, Lanes<std::int32_t, K> b) {
+    return a * b;
+}
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int64_t, K> low_product(Lanes<std::int64_t, K> a, Lanes<std::int64_t, K> b) {
+    const hn::ScalableTag<std::int64_t> d;
+    const hn::ScalableTag<std::uint64_t> du;
+    const hn::ScalableTag<std::uint32_t> d32;
+    const auto x = hn::BitCast(du, a.v), y = hn::BitCast(du, b.v);
+    const auto product = [&](auto p, auto q) {
+        return hn::MulEven(hn::BitCast(d32, p), hn::BitCast(d32, q));
+    };
+    const auto cross = hn::Add(product(hn::ShiftRight<32>(x), y), product(x, hn::ShiftRight<32>(y)));
+    return {hn::BitCast(d, hn::Add(product(x, y), hn::ShiftLeft<32>(cross)))};
+}
+
+/// quantise.h's quotient.  A floating-point estimate of the floor, off by one at most, is corrected by the
+/// exact rest. 32-bit lanes: results of at most 22 bits, denominators below 2^29 (pipeline/plan.cpp checks).
+/// Saturating wires only.
+template <class T, KnownRescales K>
+HWY_INLINE Lanes<T, K> quotient(Lanes<T, K> numerator, Lanes<T, K> denominator, const Rescale& to) {
+    using F = lanes_detail::FloatOf<T>;
+    const hn::ScalableTag<T> d;
+    const hn::ScalableTag<F> df;
+    const auto one = hn::Set(d, T{1}), zero = hn::Zero(d);
+    const Lanes<T, K> scaled = shift_left(numerator, -to.shift);
+    const auto factor = hn::Set(df, static_cast<F>(power_of_two<double>(-to.shift)));
+    const auto ratio =
+        hn::Div(hn::Mul(lanes_detail::to_floats(numerator), factor), lanes_detail::to_floats(denominator));
+    const auto beyond = hn::Set(df, static_cast<F>(to.highest + 1));
+    Lanes<T, K> q{hn::ConvertTo(d, hn::Min(ratio, beyond))};
+    Lanes<T, K> rest = scaled - low_product(q, denominator);
+    const auto below = hn::Lt(rest.v, zero);
+    q.v = hn::Sub(q.v, hn::IfThenElseZero(below, one));
+    rest.v = hn::Add(rest.v, hn::IfThenElseZero(below, denominator.v));
+    const auto above = hn::Not(hn::Lt(rest.v, denominator.v));
+    q.v = hn::Add(q.v, hn::IfThenElseZero(above, one));
+    rest.v = hn::Sub(rest.v, hn::IfThenElseZero(above, denominator.v));
+    const auto twice = hn::Add(rest.v, rest.v);
+    if (to.rounding == Rounding::rnd)
+        q.v = hn::Add(q.v, hn::IfThenZeroElse(hn::Lt(twice, denominator.v), one));
+    if (to.rounding == Rounding::rnd_conv) {
+        const auto up = hn::Or(hn::Gt(twice, denominator.v),
+                               hn::And(hn::Eq(twice, denominator.v), hn::Ne(hn::And(q.v, one), zero)));
+        q.v = hn::Add(q.v, hn::IfThenElseZero(up, one));
+    }
+    return clamp(q, limit_in_lanes<T, K>(to.lowest), limit_in_lanes<T, K>(to.highest));
+}
+
+// ------------------------------------------------------------------------------------------------ wide
+// numbers
+
+/// words.h's Wide of 32-bit lanes: doubles, the lower half of the lanes and the upper one.
+template <KnownRescales K>
+struct WideLanes {
+    using V = hn::Vec<hn::ScalableTag<double>>;
+    V low, high;
+};
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+namespace squint {
+template <KnownRescales K>
+struct WideOf<HWY_NAMESPACE::Lanes<std::int32_t, K>> {
+    using Type = HWY_NAMESPACE::WideLanes<K>;
+};
+}  // namespace squint
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+
+namespace lanes_detail {
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int32_t, K> narrow(const WideLanes<K>& x) {
+    const hn::ScalableTag<std::int32_t> d;
+#if HWY_TARGET == HWY_SCALAR
+    return {hn::DemoteTo(d, x.low)};  // saturates, as the vectors' does
+#else
+    const hn::Half<decltype(d)> half;
+    return {hn::Combine(d, hn::DemoteTo(half, x.high), hn::DemoteTo(half, x.low))};
+#endif
+}
+template <KnownRescales K, class F>
+HWY_INLINE WideLanes<K> by_halves(F&& f) {
+#if HWY_TARGET == HWY_SCALAR
+    const auto only = f([](const auto& x) { return x.low; });
+    return {only, only};
+#else
+    return {f([](const auto& x) { return x.low; }), f([](const auto& x) { return x.high; })};
+#endif
+}
+}  // namespace lanes_detail
+/// 64-bit lanes are wide themselves.
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int64_t, K> widen(Lanes<std::int64_t, K> x) {
+    return x;
+}
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int64_t, K> wide_sum(Lanes<std::int64_t, K> high, int bits,
+                                           Lanes<std::int64_t, K> low) {
+    return shift_left(high, bits) + low;
+}
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int64_t, K> wide_product(Lanes<std::int64_t, K> a, Lanes<std::int64_t, K> b) {
+    return a * b;
+}
+template <KnownRescales K>
+HWY_INLINE WideLanes<K> widen(Lanes<std::int32_t, K> x) {
+    const hn::ScalableTag<double> wide;
+#if HWY_TARGET == HWY_SCALAR
+    const auto only = hn::PromoteTo(wide, x.v);
+    return {only, only};
+#else
+    const hn::Half<hn::ScalableTag<std::int32_t>> half;
+    return {hn::PromoteTo(wide, hn::LowerHalf(half, x.v)), hn::PromoteTo(wide, hn::UpperHalf(half, x.v))};
+#endif
+}
+template <KnownRescales K>
+HWY_INLINE WideLanes<K> operator+(const WideLanes<K>& a, const WideLanes<K>& b) {
+    return {hn::Add(a.low, b.low), hn::Add(a.high, b.high)};
+}
+template <KnownRescales K>
+HWY_INLINE WideLanes<K> operator-(const WideLanes<K>& a, const WideLanes<K>& b) {
+    return {hn::Sub(a.low, b.low), hn::Sub(a.high, b.high)};
+}
+template <KnownRescales K>
+HWY_INLINE WideLanes<K> shift_left(const WideLanes<K>& x, int bits) {
+    const auto factor = hn::Set(hn::ScalableTag<double>(), power_of_two<double>(bits));
+    return {hn::Mul(x.low, factor), hn::Mul(x.high, factor)};
+}
+template <KnownRescales K>
+HWY_INLINE WideLanes<K> wide_sum(Lanes<std::int32_t, K> high, int bits, Lanes<std::int32_t, K> low) {
+    return shift_left(widen(high), bits) + widen(low);
+}
+template <KnownRescales K>
+HWY_INLINE WideLanes<K> wide_product(Lanes<std::int32_t, K> a, Lanes<std::int32_t, K> b) {
+    const auto x = widen(a), y = widen(b);
+    return {hn::Mul(x.low, y.low), hn::Mul(x.high, y.high)};
+}
+template <KnownRescales K>
+HWY_INLINE WideLanes<K> absolute(const WideLanes<K>& x) {
+    return {hn::Abs(x.low), hn::Abs(x.high)};
+}
+template <KnownRescales K>
+HWY_INLINE WideLanes<K> max(const WideLanes<K>& a, const WideLanes<K>& b) {
+    return {hn::Max(a.low, b.low), hn::Max(a.high, b.high)};
+}
+/// An estimate, off by one at most, and its exact rest: the product of either half of the estimate with the
+/// denominator has 53 bits at most (range.cpp notes it).  A result beyond 32 bits saturates.
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int32_t, K> quotient(const WideLanes<K>& numerator, const WideLanes<K>& denominator,
+                                           const Rescale& to) {
+    const hn::ScalableTag<double> d;
+    const auto one = hn::Set(d, 1.0), zero = hn::Zero(d);
+    const auto factor = hn::Set(d, power_of_two<double>(-to.shift));
+    const bool to_nearest = to.rounding == Rounding::rnd || to.rounding == Rounding::rnd_conv;
+    const auto half = [&](auto part) SQUINT_WRITTEN_OUT {
+        const auto below = part(denominator), scaled = hn::Mul(part(numerator), factor);
+        const auto estimate = hn::Mul(scaled, hn::Div(one, below));
+        auto q = to_nearest ? hn::Round(estimate) : hn::Trunc(estimate);
+#if (HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2 && HWY_TARGET != HWY_SCALAR) || HWY_ARCH_ARM_A64
+        const auto rest = hn::NegMulAdd(q, below, scaled);  // one rounding alone
+#else
+        const auto coarse = hn::Mul(hn::Trunc(hn::Mul(q, hn::Set(d, power_of_two<double>(-to.width / 2)))),
+                                    hn::Set(d, power_of_two<double>(to.width / 2)));
+        const auto rest =
+            hn::Sub(hn::Sub(scaled, hn::Mul(coarse, below)), hn::Mul(hn::Sub(q, coarse), below));
+#endif
+        if (!to_nearest) {
+            q = hn::Sub(q, hn::IfThenElseZero(hn::Lt(rest, zero), one));
+            return hn::Add(q, hn::IfThenElseZero(hn::Ge(rest, below), one));
+        }
+        const auto twice = hn::Add(rest, rest);
+        auto down = hn::Lt(twice, hn::Neg(below)), up = hn::Ge(twice, below);
+        if (to.rounding == Rounding::rnd_conv) {
+            const auto halved = hn::Mul(q, hn::Set(d, 0.5));
+            const auto odd = hn::Ne(halved, hn::Trunc(halved));
+            down = hn::Or(down, hn::And(hn::Eq(twice, hn::Neg(below)), odd));
+            up = hn::Or(hn::Gt(twice, below), hn::And(hn::Eq(twice, below), odd));
+        }
+        q = hn::Sub(q, hn::IfThenElseZero(down, one));
+        return hn::Add(q, hn::IfThenElseZero(up, one));
+    };
+    const auto q = lanes_detail::narrow(lanes_detail::by_halves<K>(half));
+    return clamp(q, limit_in_lanes<std::int32_t, K>(to.lowest), limit_in_lanes<std::int32_t, K>(to.highest));
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif
