@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/portable_math.h"
+#include "core/rays.h"
 
 #include <fmt/format.h>
 
@@ -157,25 +158,15 @@ Camera make_camera(const CameraSettings& settings, const Volume& volume, int wid
 }
 
 Ray Camera::ray(int column, int row) const {
-    const double scale = half_height / height;
-    const double across = ((2 * column + 1) - width) * scale, above = (height - (2 * row + 1)) * scale;
-    if (projection == Projection::orthographic) return {eye + right * across + up * above, view};
-    return {eye, unit(view + right * across + up * above)};
+    const auto ray = HWY_NAMESPACE::ray_through<double>(*this, column, row);
+    return {Vec3(ray.origin[0], ray.origin[1], ray.origin[2]),
+            Vec3(ray.direction[0], ray.direction[1], ray.direction[2])};
 }
 
 Interval intersect(const Ray& ray, const Vec3& low, const Vec3& high) {
-    Interval inside{0, std::numeric_limits<double>::infinity()};  // nothing lies behind the eye
-    for (int axis = 0; axis < 3; ++axis) {
-        const double origin = ray.origin[axis], direction = ray.direction[axis];
-        if (direction == 0) {  // parallel to this pair of faces: in one of them is inside
-            if (origin < low[axis] || origin > high[axis]) return {};
-            continue;
-        }
-        const double to_low = (low[axis] - origin) / direction, to_high = (high[axis] - origin) / direction;
-        inside.first = std::max(inside.first, std::min(to_low, to_high));
-        inside.last = std::min(inside.last, std::max(to_low, to_high));
-    }
-    return inside.empty() ? Interval{} : inside;
+    const Vec3 &o = ray.origin, &d = ray.direction;
+    const auto inside = HWY_NAMESPACE::intersect_box<double>({{o.x, o.y, o.z}, {d.x, d.y, d.z}}, low, high);
+    return {inside.first, inside.last};
 }
 
 }  // namespace squint

@@ -1,5 +1,7 @@
 #include "pipeline/plan.h"
 
+#include "pipeline/ray_setup.h"
+
 #include "core/error.h"
 #include "core/portable_math.h"
 
@@ -514,29 +516,16 @@ void report_stages(Plan& plan) {
 }  // namespace
 
 RaySetup Plan::set_up(int column, int row) const {
-    RaySetup setup;
-    const Ray ray = camera.ray(column, row);
-    setup.direction = ray.direction;
-    const Interval inside = intersect(ray, box_low, box_high);
-    if (inside.empty()) return setup;
-    const double steps = (inside.last - inside.first) / step_world;
-    // A chord of n steps is n slabs: 2^-30 steps forgive the rounding of the chord itself.
-    const double whole = std::max(1.0, std::ceil(steps - 0x1p-30));
-    setup.slabs = static_cast<int>(whole);
-    setup.last_length = std::clamp(steps - (whole - 1), 0.0, 1.0);
-    setup.step = ray.direction * step_world / volume->spacing;
-    setup.entry_distance = inside.first;
-    const bool middle = scene.classification.method == Method::pc_mid && !projection_mode;
-    setup.first = volume->voxel_from_world(ray.origin + ray.direction * inside.first);
-    setup.last = volume->voxel_from_world(ray.origin + ray.direction * inside.last);
-    setup.last_index = setup.slabs;
-    if (middle) {
-        setup.last_index = setup.slabs - 1;
-        setup.first += setup.step * 0.5;
-        setup.last = volume->voxel_from_world(
-            ray.origin + ray.direction * (inside.last - 0.5 * setup.last_length * step_world));
-    }
-    return setup;
+    const auto ray = HWY_NAMESPACE::set_up_ray<double>(*this, column, row);
+    const auto vector = [](const std::array<double, 3>& v) { return Vec3(v[0], v[1], v[2]); };
+    return {.first = vector(ray.first),
+            .last = vector(ray.last),
+            .step = vector(ray.step),
+            .direction = vector(ray.direction),
+            .slabs = static_cast<int>(ray.slabs),
+            .last_index = static_cast<int>(ray.last_index),
+            .last_length = ray.last_length,
+            .entry_distance = ray.entry_distance};
 }
 
 Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int frame) {

@@ -9,6 +9,7 @@
 #include "pipeline/gradient.h"
 #include "pipeline/interpolation.h"
 #include "pipeline/location.h"
+#include "pipeline/ray_setup.h"
 #include "pipeline/shading.h"
 
 #include <algorithm>
@@ -39,59 +40,6 @@ struct NoObserver {
 #include <hwy/highway.h>
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
-
-/// A set-up value to a word: rounded by its wire, or (Real, inactive) exact.
-template <class W>
-W word_from(double value, const Spec& spec, const Rescale& to) {
-    return constant<W>(quantise_real(value, static_cast<double>(spec.format.one()), to));
-}
-template <class W>
-requires requires {
-    typename W::IsReal;
-}
-W word_from(double value, const Spec& spec, const Rescale& to) {
-    return W::from(to.active ? static_cast<double>(quantise_real(value, spec))
-                             : value * static_cast<double>(spec.format.one()));
-}
-template <class W>
-requires std::same_as<W, Audited> W word_from(double value, const Spec& spec, const Rescale& to) {
-    const std::int64_t raw = quantise_real(value, spec);
-    const double exact = value * static_cast<double>(spec.format.one());
-    Rescale free = to;
-    free.lowest = std::numeric_limits<std::int64_t>::min(),
-    free.highest = std::numeric_limits<std::int64_t>::max(), free.wraps = false;
-    return record(raw, static_cast<double>(raw) != exact, exact, free);
-}
-
-template <class W>
-RayWords<W> ray_words(const Plan& plan, const RaySetup& ray) {
-    const LocationStage& s = plan.location;
-    RayWords<W> words{};
-    for (int axis = 0; axis < 3; ++axis) {
-        const auto a = static_cast<std::size_t>(axis);
-        const W low = constant<W>(0), high = constant<W>(s.limit[a]);
-        words.first[a] = clamp(word_from<W>(ray.first[axis], s.location, s.to_first), low, high);
-        words.last[a] = clamp(word_from<W>(ray.last[axis], s.location, s.to_first), low, high);
-        words.step[a] = word_from<W>(ray.step[axis], s.direction, s.to_direction);
-    }
-    words.last_index = constant<W>(ray.last_index);
-    words.last_length = word_from<W>(ray.last_length, s.length, s.to_length);
-    if (plan.lit) {
-        const ShadingStage& shading = plan.shading;
-        const Vec3 eye = -ray.direction;
-        for (int axis = 0; axis < 3; ++axis)
-            words.view[static_cast<std::size_t>(axis)] =
-                word_from<W>(eye[axis], shading.light_spec, shading.to_light);
-        for (std::size_t l = 0; shading.half_per_ray && l < static_cast<std::size_t>(shading.lights); ++l) {
-            const auto& light = shading.light_exact[l];
-            const Vec3 half = (Vec3(light[0], light[1], light[2]) + eye).normalized();
-            for (int axis = 0; axis < 3; ++axis)
-                words.half[l][static_cast<std::size_t>(axis)] =
-                    word_from<W>(half[axis], shading.light_spec, shading.to_light);
-        }
-    }
-    return words;
-}
 
 /// Fetching is apart from arithmetic: stages receive voxels, they do not index the volume.
 template <class W>

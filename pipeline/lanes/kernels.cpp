@@ -44,6 +44,7 @@ std::int64_t find_target(const std::string& name) {
 StageKernels kernels_for(const Plan& plan, const StageWays& ways, const VoxelSource& source,
                          std::int64_t target) {
     StageKernels kernels;
+    ray_kernels(target, kernels);
     sampling_kernels(target, plan, ways, kernels);
     voxel_kernels(target, source, kernels);
     classification_kernel(target, plan, ways.classification, kernels);

@@ -22,6 +22,10 @@ struct VoxelSource {
 };
 
 struct StageKernels {
+    /// Sets up a packet's rays: stage 1's words.
+    void (*set_up)(const Plan&, const PacketPlace&, RayPacket&) = nullptr;
+    /// About where they run, for leave_out.
+    void (*set_course)(const Plan&, const EmptySpace&, const RayPacket&, RayCourse&) = nullptr;
     /// Steps from slab k that every ray of the packet can leave out: all of them stay in blocks where nothing
     /// is to be seen.  At most `most`.
     int (*leave_out)(const EmptySpace&, const RayCourse&, const RayPacket&, const PixelPacket&,
@@ -70,6 +74,7 @@ StageKernels kernels_for(const Plan& plan, const StageWays& ways, const VoxelSou
                          std::int64_t target);
 
 // One a file of kernels.
+void ray_kernels(std::int64_t target, StageKernels& kernels);
 void sampling_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels);
 void voxel_kernels(std::int64_t target, const VoxelSource& source, StageKernels& kernels);
 void classification_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);

@@ -16,8 +16,6 @@ namespace {
 
 using namespace squint::HWY_NAMESPACE;
 
-constexpr int kSide = 4;  // a packet is 4x4 pixels
-
 // Bits of the lanes that hold a stage; 0 where none does.
 int bits_of(const WordNeeds& needs) {
     constexpr int kBitsOfDouble = 54;  // with a sign: what 32-bit lanes have for wide numbers
@@ -43,73 +41,6 @@ KnownRescales known_of(Stage... stage) {
     const auto visit = [&](auto& r) { all(r); };
     (stage.visit(visit), ...);
     return all.known;
-}
-
-// ------------------------------------------------------------------------------------------------ rays
-
-struct PixelPlace {
-    int column, row;
-    bool inside;
-};
-
-struct PacketSetup {
-    PixelPlace place[kRays];
-    RaySetup ray[kRays];
-    int most_slabs = 0, rays = 0;
-};
-
-void set_up_packet(const Plan& plan, int left, int top, int right, int bottom, PacketSetup& setup,
-                   RayPacket& packet) {
-    for (int r = 0; r < kRays; ++r) {
-        PixelPlace& place = setup.place[r];
-        place = {left + r % kSide, top + r / kSide, false};
-        place.inside = place.column < right && place.row < bottom;
-        setup.ray[r] = place.inside ? plan.set_up(place.column, place.row) : RaySetup{};
-        const RaySetup& ray = setup.ray[r];
-        setup.most_slabs = std::max(setup.most_slabs, ray.slabs);
-        setup.rays += ray.slabs > 0;
-        const RayWords<std::int64_t> words =
-            ray.slabs > 0 ? ray_words<std::int64_t>(plan, ray) : RayWords<std::int64_t>{};
-        for (std::size_t a = 0; a < 3; ++a) {
-            packet.first[a].v[r] = static_cast<Word>(words.first[a]);
-            packet.last[a].v[r] = static_cast<Word>(words.last[a]);
-            packet.step[a].v[r] = static_cast<Word>(words.step[a]);
-            packet.view[a].v[r] = static_cast<Word>(words.view[a]);
-            for (std::size_t l = 0; l < kMostHalves; ++l)
-                packet.half[l][a].v[r] = static_cast<Word>(words.half[l][a]);
-        }
-        packet.last_index.v[r] = static_cast<Word>(words.last_index);
-        packet.last_length.v[r] = static_cast<Word>(words.last_length);
-        packet.slabs.v[r] = ray.slabs;
-    }
-}
-
-// ------------------------------------------------------------------------------------------------ empty
-// space
-
-// About where the rays run, for leaving out empty space.
-void set_course(const Plan& plan, const EmptySpace& empty, const RayPacket& rays, RayCourse& course) {
-    const auto cell_unit = static_cast<float>(std::ldexp(1.0, -plan.location.location_fraction));
-    const auto step_unit = static_cast<float>(std::ldexp(1.0, -plan.location.direction_fraction));
-    // A location is rounded once, by a last bit at most; floats add their own error.
-    float largest = 1;
-    for (int a = 0; a < 3; ++a) largest = std::max(largest, static_cast<float>(plan.volume->dims[a]));
-    course.margin = cell_unit + largest * 0x1p-20F + 0x1p-10F;
-    for (int r = 0; r < kRays; ++r) {
-        Index3 exit;
-        for (int a = 0; a < 3; ++a) {
-            course.first[a].v[r] = static_cast<float>(rays.first[a].v[r]) * cell_unit;
-            const float step = static_cast<float>(rays.step[a].v[r]) * step_unit;
-            course.step[a].v[r] = step;
-            course.pace[a].v[r] = step == 0 ? 1e30F : 1 / std::abs(step);
-            exit[a] = std::min<std::int64_t>(
-                (rays.last[a].v[r] >> plan.location.location_fraction) >> kBlockBits, empty.blocks[a] - 1);
-        }
-        // The ray's last sample stands at its exit, off P0 + kV by what rounding V adds up to.
-        course.skippable.v[r] = empty.at(exit.x, exit.y, exit.z) > 0
-                                    ? std::numeric_limits<Word>::max()
-                                    : rays.last_index.v[r] - (plan.needs_back ? 1 : 0);
-    }
 }
 
 std::int64_t free_memory() {
@@ -233,7 +164,6 @@ namespace {
 
 // One packet's buffers: about 60 KiB, most of it touched only where light falls.
 struct Workspace {
-    PacketSetup setup;
     RayPacket rays;
     RayCourse course;
     PixelPacket pixels;
@@ -256,7 +186,7 @@ class PacketLoop {
     void run() {
         located_ = -1, visited_ = 0;
         start_pixels();
-        if (empty_) set_course(plan_, *empty_, w_.rays, w_.course);
+        if (empty_) kernels_.set_course(plan_, *empty_, w_.rays, w_.course);
         if (backwards_)
             run_backwards();
         else
@@ -279,12 +209,12 @@ class PacketLoop {
 
     void run_forwards() {
         bool carried = false;  // the sample behind the last slab is known: the next batch's row 0
-        for (int k = 0; k < w_.setup.most_slabs;) {
+        for (int k = 0; k < w_.rays.most_slabs;) {
             if (const int skip = leave_out(k); skip > 0) {
                 k += skip, carried = false;
                 continue;
             }
-            batch(k, std::min(kSteps, w_.setup.most_slabs - k), carried);
+            batch(k, std::min(kSteps, w_.rays.most_slabs - k), carried);
             carried = plan_.needs_back;
             k += kSteps;
             if (!any_active(w_.pixels)) return;
@@ -292,7 +222,7 @@ class PacketLoop {
     }
 
     void run_backwards() {
-        for (int end = w_.setup.most_slabs; end > 0; end -= kSteps) {
+        for (int end = w_.rays.most_slabs; end > 0; end -= kSteps) {
             const int k = std::max(0, end - kSteps);
             batch(k, end - k, false);
         }
@@ -302,7 +232,7 @@ class PacketLoop {
     int leave_out(int k) {
         if (!empty_) return 0;
         const int steps = kernels_.leave_out(*empty_, w_.course, w_.rays, w_.pixels, plan_.volume->dims, k,
-                                             w_.setup.most_slabs - k);
+                                             w_.rays.most_slabs - k);
         for (int r = 0; r < kRays && steps > 0; ++r)
             if (w_.pixels.active.v[r]) w_.pixels.samples.v[r] += std::clamp(w_.rays.slabs.v[r] - k, 0, steps);
         return steps;
@@ -311,7 +241,7 @@ class PacketLoop {
     Samples& here() { return w_.samples[current_]; }
 
     int samples_for(int k) const {
-        return std::min(kSteps, w_.setup.most_slabs - k) + (plan_.needs_back ? 1 : 0);
+        return std::min(kSteps, w_.rays.most_slabs - k) + (plan_.needs_back ? 1 : 0);
     }
 
     // Slabs k to k + steps through all stages.
@@ -331,7 +261,7 @@ class PacketLoop {
         kernels_.classify(plan_, steps, s);
         if (plan_.lit) light(steps);
         kernels_.composite(plan_, w_.rays, steps, s, w_.pixels);
-        visited_ += steps * w_.setup.rays;
+        visited_ += steps * w_.rays.rays;
     }
 
     void locate(Samples& s, int k, int from, int to) {
@@ -343,7 +273,7 @@ class PacketLoop {
     // Locations of the batch at k, and its voxels on their way from memory while this batch computes.
     void look_ahead(int k) {
         located_ = -1;
-        if (k >= w_.setup.most_slabs) return;
+        if (k >= w_.rays.most_slabs) return;
         locate(w_.samples[1 - current_], k, plan_.needs_back ? 1 : 0, samples_for(k));
         located_ = k;
     }
@@ -389,20 +319,19 @@ void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& 
     PacketLoop loop(plan_, kernels_, voxels_, empty_ ? &*empty_ : nullptr, w);
     for (int y = top; y < bottom; y += kSide)
         for (int x = left; x < right; x += kSide) {
-            w.setup = {};
-            set_up_packet(plan_, x, y, right, bottom, w.setup, w.rays);
+            const PacketPlace place{x, y, right, bottom};
+            kernels_.set_up(plan_, place, w.rays);
             loop.run();
             for (int r = 0; r < kRays; ++r) {
-                const PixelPlace& place = w.setup.place[r];
-                if (!place.inside) continue;
+                if (!place.inside(r)) continue;
                 Pixel<std::int64_t> pixel;
                 for (std::size_t c = 0; c < 3; ++c) pixel.gathered.color[c] = w.pixels.color[c].v[r];
                 pixel.gathered.transparency = w.pixels.transparency.v[r];
                 pixel.samples = w.pixels.samples.v[r];
-                store_pixel(plan_, pixel, place.column, place.row, image);
+                store_pixel(plan_, pixel, place.column(r), place.row(r), image);
                 statistics.samples += pixel.samples;
             }
-            statistics.rays += w.setup.rays, statistics.visited += loop.visited();
+            statistics.rays += w.rays.rays, statistics.visited += loop.visited();
         }
 }
 

@@ -10,7 +10,8 @@
 
 namespace squint::lanes {
 
-inline constexpr int kRays = 16;          // 4x4 pixels
+inline constexpr int kSide = 4;  // pixels along a packet's side
+inline constexpr int kRays = kSide * kSide;
 inline constexpr int kSteps = 8;          // slabs of each ray in a batch
 inline constexpr int kRows = kSteps + 1;  // samples: a slab may want the one behind it
 inline constexpr int kBatch = kRays * kRows;
@@ -26,10 +27,21 @@ struct alignas(64) RealRow {
     float v[kRays];
 };
 
-/// Sixteen rays, set up; those that miss have no slabs.
+/// Sixteen pixels of a tile: pixel r is (left + r % 4, top + r / 4).  Those from `right` or `bottom` on are
+/// outside it.
+struct PacketPlace {
+    int left, top, right, bottom;
+    int column(int r) const { return left + r % kSide; }
+    int row(int r) const { return top + r / kSide; }
+    bool inside(int r) const { return column(r) < right && row(r) < bottom; }
+};
+
+/// Sixteen rays, set up; those that miss, or lie outside the tile, have no slabs.
 struct alignas(64) RayPacket {
     Row first[3], last[3], step[3], last_index, slabs, last_length;
     Row half[kMostHalves][3], view[3];
+    alignas(64) double entry_distance[kRays];  // world, as RaySetup's
+    int most_slabs, rays;                      // of any ray; rays that have slabs
 };
 
 /// The same rays for leaving out empty space: about where they are, never used to take a sample.

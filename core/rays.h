@@ -1,0 +1,154 @@
+// Rays of a camera and their way through a box, over a real word D: doubles one by one, or as many side by
+// side as a vector register holds.  + - * / sqrt and comparisons alone: the same bits on every CPU.
+#if defined(SQUINT_CORE_RAYS_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_CORE_RAYS_H
+#undef SQUINT_CORE_RAYS_H
+#else
+#define SQUINT_CORE_RAYS_H
+#endif
+
+#include "core/camera.h"
+
+#include <hwy/highway.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+
+// ------------------------------------------------------------------------------------------------ doubles
+
+HWY_INLINE double choose(bool condition, double yes, double no) {
+    return condition ? yes : no;
+}
+HWY_INLINE double square_root(double x) {
+    return std::sqrt(x);
+}
+HWY_INLINE double ceiling(double x) {
+    return std::ceil(x);
+}
+
+/// Doubles side by side.
+struct Reals {
+    using D = hwy::HWY_NAMESPACE::ScalableTag<double>;
+    using V = hwy::HWY_NAMESPACE::Vec<D>;
+    V v;
+    Reals() = default;
+    HWY_INLINE explicit Reals(double x) : v(hwy::HWY_NAMESPACE::Set(D(), x)) {}
+    HWY_INLINE explicit Reals(V x) : v(x) {}
+    static constexpr int count() { return static_cast<int>(HWY_LANES(double)); }
+};
+struct RealsMask {
+    hwy::HWY_NAMESPACE::Mask<Reals::D> m;
+};
+HWY_INLINE Reals operator+(Reals a, Reals b) {
+    return Reals(hwy::HWY_NAMESPACE::Add(a.v, b.v));
+}
+HWY_INLINE Reals operator-(Reals a, Reals b) {
+    return Reals(hwy::HWY_NAMESPACE::Sub(a.v, b.v));
+}
+HWY_INLINE Reals operator*(Reals a, Reals b) {
+    return Reals(hwy::HWY_NAMESPACE::Mul(a.v, b.v));
+}
+HWY_INLINE Reals operator/(Reals a, Reals b) {
+    return Reals(hwy::HWY_NAMESPACE::Div(a.v, b.v));
+}
+HWY_INLINE RealsMask operator<(Reals a, Reals b) {
+    return {hwy::HWY_NAMESPACE::Lt(a.v, b.v)};
+}
+HWY_INLINE RealsMask operator==(Reals a, Reals b) {
+    return {hwy::HWY_NAMESPACE::Eq(a.v, b.v)};
+}
+HWY_INLINE RealsMask operator&(RealsMask a, RealsMask b) {
+    return {hwy::HWY_NAMESPACE::And(a.m, b.m)};
+}
+HWY_INLINE RealsMask operator|(RealsMask a, RealsMask b) {
+    return {hwy::HWY_NAMESPACE::Or(a.m, b.m)};
+}
+HWY_INLINE RealsMask operator!(RealsMask a) {
+    return {hwy::HWY_NAMESPACE::Not(a.m)};
+}
+HWY_INLINE Reals choose(RealsMask condition, Reals yes, Reals no) {
+    return Reals(hwy::HWY_NAMESPACE::IfThenElse(condition.m, yes.v, no.v));
+}
+HWY_INLINE Reals square_root(Reals x) {
+    return Reals(hwy::HWY_NAMESPACE::Sqrt(x.v));
+}
+HWY_INLINE Reals ceiling(Reals x) {
+    return Reals(hwy::HWY_NAMESPACE::Ceil(x.v));
+}
+
+/// The first of two that are equal, so that zeros of either sign come out alike from every word.
+template <class D>
+HWY_INLINE D lesser(D a, D b) {
+    return choose(b < a, b, a);
+}
+template <class D>
+HWY_INLINE D greater(D a, D b) {
+    return choose(a < b, b, a);
+}
+
+// ------------------------------------------------------------------------------------------------ rays
+
+template <class D>
+using RealVector = std::array<D, 3>;
+
+/// v / |v|; zero for a vector too short to have a direction.
+template <class D>
+HWY_INLINE RealVector<D> unit_vector(const RealVector<D>& v) {
+    const D squares = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+    const auto none = squares < D(std::numeric_limits<double>::min());
+    const D length = square_root(choose(none, D(1), squares));
+    return {choose(none, D(0), v[0] / length), choose(none, D(0), v[1] / length),
+            choose(none, D(0), v[2] / length)};
+}
+
+template <class D>
+struct RayOf {
+    RealVector<D> origin, direction;  // world; unit length
+};
+
+/// Camera::ray for columns and rows that are whole numbers.
+template <class D>
+HWY_INLINE RayOf<D> ray_through(const Camera& camera, D column, D row) {
+    const D scale(camera.half_height / camera.height);
+    const D across = (D(2) * column + D(1) - D(camera.width)) * scale,
+            above = (D(camera.height) - (D(2) * row + D(1))) * scale;
+    const bool orthographic = camera.projection == Projection::orthographic;
+    RealVector<D> moved;
+    for (int a = 0; a < 3; ++a)
+        moved[static_cast<std::size_t>(a)] = D(orthographic ? camera.eye[a] : camera.view[a]) +
+                                             D(camera.right[a]) * across + D(camera.up[a]) * above;
+    if (orthographic) return {moved, {D(camera.view.x), D(camera.view.y), D(camera.view.z)}};
+    return {{D(camera.eye.x), D(camera.eye.y), D(camera.eye.z)}, unit_vector(moved)};
+}
+
+/// The part of a ray inside a box [low, high], as distances along it: both zero where there is none.
+template <class D>
+struct IntervalOf {
+    D first, last;
+};
+template <class D>
+HWY_INLINE IntervalOf<D> intersect_box(const RayOf<D>& ray, const Vec3& low, const Vec3& high) {
+    IntervalOf<D> inside{D(0), D(std::numeric_limits<double>::infinity())};  // nothing lies behind the eye
+    auto outside = D(0) < D(0);
+    for (int axis = 0; axis < 3; ++axis) {
+        const auto a = static_cast<std::size_t>(axis);
+        const D origin = ray.origin[a], from(low[axis]), to(high[axis]);
+        // Parallel to this pair of faces: in one of them is inside.
+        const auto parallel = ray.direction[a] == D(0);
+        outside = outside | (parallel & ((origin < from) | (to < origin)));
+        const D direction = choose(parallel, D(1), ray.direction[a]);
+        const D to_low = (from - origin) / direction, to_high = (to - origin) / direction;
+        inside.first = choose(parallel, inside.first, greater(inside.first, lesser(to_low, to_high)));
+        inside.last = choose(parallel, inside.last, lesser(inside.last, greater(to_low, to_high)));
+    }
+    const auto none = outside | !(inside.first < inside.last);
+    return {choose(none, D(0), inside.first), choose(none, D(0), inside.last)};
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif
