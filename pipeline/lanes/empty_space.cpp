@@ -36,34 +36,63 @@ void measure_slab(const Volume& volume, BlockRanges& ranges, std::int64_t bz) {
     }
 }
 
-// Distance to the nearest zero along x, then y, then z: separable for the Chebyshev distance only as a
-// dilation, so each pass takes min over the line of max(|offset|, distance so far).
+// Chebyshev distance to the nearest zero: one more than the nearest of a block's 26 neighbours has, 13 of
+// them on the way forth and 13 on the way back.
 void spread(std::vector<std::uint8_t>& distance, const Index3& blocks) {
-    const auto pass = [&](std::int64_t count, std::int64_t stride, std::int64_t lines, auto&& start) {
-        tbb::parallel_for(std::int64_t{0}, lines, [&](std::int64_t line) {
-            std::vector<std::uint8_t> in(static_cast<std::size_t>(count));
-            std::uint8_t* base = distance.data() + start(line);
-            for (std::int64_t i = 0; i < count; ++i) in[static_cast<std::size_t>(i)] = base[i * stride];
-            for (std::int64_t i = 0; i < count; ++i) {
-                int best = in[static_cast<std::size_t>(i)];
-                for (std::int64_t j = 1; j < best; ++j) {
-                    const auto left = i - j, right = i + j;
-                    if (left >= 0)
-                        best = std::min(best, std::max(static_cast<int>(j),
-                                                       static_cast<int>(in[static_cast<std::size_t>(left)])));
-                    if (right < count)
-                        best =
-                            std::min(best, std::max(static_cast<int>(j),
-                                                    static_cast<int>(in[static_cast<std::size_t>(right)])));
+    const auto nx = static_cast<std::size_t>(blocks.x);
+    std::vector<std::uint8_t> nearest(nx +
+                                      2);  // of the rows already passed, with a block more on either side
+    const auto pass = [&](bool forth) {
+        const std::int64_t before = forth ? -1 : 1;
+        const auto at = [&](std::int64_t i, std::int64_t count) { return forth ? i : count - 1 - i; };
+        for (std::int64_t k = 0; k < blocks.z; ++k)
+            for (std::int64_t j = 0; j < blocks.y; ++j) {
+                const std::int64_t z = at(k, blocks.z), y = at(j, blocks.y);
+                const auto row = [&](std::int64_t dy, std::int64_t dz) -> std::uint8_t* {
+                    const bool inside = y + dy >= 0 && y + dy < blocks.y && z + dz >= 0 && z + dz < blocks.z;
+                    return inside ? distance.data() + ((z + dz) * blocks.y + y + dy) * blocks.x : nullptr;
+                };
+                std::fill(nearest.begin(), nearest.end(), std::uint8_t{254});
+                for (const std::uint8_t* passed :
+                     {row(before, 0), row(-1, before), row(0, before), row(1, before)})
+                    for (std::size_t x = 0; passed && x < nx; ++x)
+                        nearest[x + 1] = std::min(nearest[x + 1], passed[x]);
+                std::uint8_t* here = row(0, 0);
+                for (std::size_t x = 0; x < nx; ++x) {
+                    const std::uint8_t around =
+                        std::min(nearest[x], std::min(nearest[x + 1], nearest[x + 2]));
+                    here[x] = std::min(here[x], static_cast<std::uint8_t>(around + 1));
                 }
-                base[i * stride] = static_cast<std::uint8_t>(best);
+                int last = 254;
+                for (std::size_t i = 0; i < nx; ++i) {
+                    std::uint8_t& d = here[forth ? i : nx - 1 - i];
+                    last = std::min<int>(d, last + 1);
+                    d = static_cast<std::uint8_t>(last);
+                }
+            }
+    };
+    pass(true), pass(false);
+}
+
+// Each block's range with its 26 neighbours': axis by axis.
+void widen(BlockRanges& ranges) {
+    const Index3 n = ranges.blocks;
+    const auto pass = [&](std::int64_t stride, std::int64_t count) {
+        const BlockRanges old = ranges;
+        tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
+            for (std::int64_t i = z * n.x * n.y; i < (z + 1) * n.x * n.y; ++i) {
+                const std::int64_t place = i / stride % count;
+                const auto at = static_cast<std::size_t>(i);
+                for (const std::int64_t step : {std::int64_t{-1}, std::int64_t{1}}) {
+                    if (place + step < 0 || place + step >= count) continue;
+                    const auto other = static_cast<std::size_t>(i + step * stride);
+                    ranges.smallest[at] = std::min(ranges.smallest[at], old.smallest[other]);
+                    ranges.largest[at] = std::max(ranges.largest[at], old.largest[other]);
+                }
             }
         });
     };
-    const auto nx = blocks.x, ny = blocks.y, nz = blocks.z;
-    pass(nx, 1, ny * nz, [=](std::int64_t line) { return line * nx; });
-    pass(ny, nx, nx * nz, [=](std::int64_t line) { return line / nx * nx * ny + line % nx; });
-    pass(nz, nx * ny, nx * ny, [=](std::int64_t line) { return line; });
+    pass(1, n.x), pass(n.x, n.y), pass(n.x * n.y, n.z);
 }
 
 }  // namespace
@@ -93,45 +122,42 @@ std::shared_ptr<const BlockRanges> block_ranges(const Volume& volume) {
         volume, [&] { return measure(volume); }, [](const BlockRanges&) { return true; });
 }
 
-EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, bool between_samples,
-                            int entry_reach) {
+EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, int reach, int entry_reach) {
     // visible_before[i]: entries below i in which anything can be seen.
     std::vector<int> visible_before(static_cast<std::size_t>(entries.size()) + 1, 0);
     for (std::size_t i = 0; i < entries.entry.size(); ++i)
         visible_before[i + 1] =
             visible_before[i] + (entries.entry[i].extinction > 0 || entries.entry[i].opaque);
-    const int last = entries.size() - 1;
-    const auto any_between = [&](double low, double high) {
-        // A sample's rounding may reach the next entry: one more on either side.
-        const int more = 1 + entry_reach;
-        const int first = std::clamp(static_cast<int>(std::floor(entries.coordinate(low))) - more, 0, last);
-        const int beyond = std::clamp(static_cast<int>(std::ceil(entries.coordinate(high))) + more, 0, last);
-        return visible_before[static_cast<std::size_t>(beyond) + 1] >
-               visible_before[static_cast<std::size_t>(first)];
+    // A sample's rounding may reach the next entry: one more on either side.
+    const int last = entries.size() - 1, more = 1 + entry_reach;
+    const auto entry_at = [&](double place) {
+        return static_cast<std::size_t>(std::clamp<double>(place, 0, last));
     };
+    std::uint16_t greatest = 0;
+    for (const std::uint16_t scalar : ranges.largest) greatest = std::max(greatest, scalar);
+    std::vector<int> before_from(greatest + 1U),
+        before_to(greatest + 1U);  // visible entries below a scalar's
+    for (std::size_t scalar = 0; scalar <= greatest; ++scalar) {
+        const double entry = entries.coordinate(static_cast<double>(scalar));
+        before_from[scalar] = visible_before[entry_at(std::floor(entry) - more)];
+        before_to[scalar] = visible_before[entry_at(std::ceil(entry) + more) + 1];
+    }
+
+    BlockRanges widened;
+    if (reach > 0) widened = ranges;
+    for (int i = 0; i < reach; ++i) widen(widened);
+    const BlockRanges& seen = reach > 0 ? widened : ranges;
     EmptySpace space;
     const Index3 n = space.blocks = ranges.blocks;
     space.distance.reserve(ranges.smallest.size() + 3);  // lanes read four bytes at any of them
     space.distance.assign(ranges.smallest.size(), 255);
-    const int reach = between_samples ? 1 : 0;
     std::atomic<std::int64_t> visible{0};
     tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
         std::int64_t here = 0;
-        for (std::int64_t y = 0; y < n.y; ++y)
-            for (std::int64_t x = 0; x < n.x; ++x) {
-                std::uint16_t low = 0xffff, high = 0;
-                for (auto dz = std::max<std::int64_t>(z - reach, 0); dz <= std::min(z + reach, n.z - 1); ++dz)
-                    for (auto dy = std::max<std::int64_t>(y - reach, 0); dy <= std::min(y + reach, n.y - 1);
-                         ++dy)
-                        for (auto dx = std::max<std::int64_t>(x - reach, 0);
-                             dx <= std::min(x + reach, n.x - 1); ++dx) {
-                            const auto at = static_cast<std::size_t>(ranges.index(dx, dy, dz));
-                            low = std::min(low, ranges.smallest[at]),
-                            high = std::max(high, ranges.largest[at]);
-                        }
-                if (any_between(low, high))
-                    space.distance[static_cast<std::size_t>(ranges.index(x, y, z))] = 0, ++here;
-            }
+        for (std::int64_t i = z * n.x * n.y; i < (z + 1) * n.x * n.y; ++i) {
+            const auto at = static_cast<std::size_t>(i);
+            if (before_to[seen.largest[at]] > before_from[seen.smallest[at]]) space.distance[at] = 0, ++here;
+        }
         visible += here;
     });
     space.visible_blocks = visible;

@@ -11,7 +11,7 @@
 
 namespace squint::lanes {
 
-inline constexpr int kBlockBits = 3;  // blocks of 8 x 8 x 8 cells
+inline constexpr int kBlockBits = 2;  // blocks of 4 x 4 x 4 cells
 inline constexpr int kBlock = 1 << kBlockBits;
 
 /// Least and greatest scalar any sample inside a block's cells can take.  Kept per volume.
@@ -34,9 +34,9 @@ struct EmptySpace {
     }
 };
 
-/// `between_samples`: the method sees the range between two samples, which may lie in neighbouring blocks.
-/// `entry_reach`: entries on either side of a slab's own that its colour may come from.
-EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, bool between_samples,
+/// `reach`: blocks that two neighbouring samples may lie apart, where the method sees the range between them;
+/// 0 where it does not. `entry_reach`: entries on either side of a slab's own that its colour may come from.
+EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, int reach,
                             int entry_reach = 0);
 
 }  // namespace squint::lanes

@@ -257,8 +257,8 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
 // space
 
 int leave_out_empty(const lanes::EmptySpace& empty, const lanes::RayCourse& course,
-                    const lanes::RayPacket& rays, const lanes::PixelPacket& pixels, const Index3& dims, int k,
-                    int most) {
+                    const lanes::RayPacket& rays, const Index3& dims, int k, int most,
+                    lanes::PixelPacket& pixels) {
     const hn::ScalableTag<float> df;
     const hn::ScalableTag<Word> d;
     const auto zero = hn::Zero(d), one = hn::Set(d, 1);
@@ -308,7 +308,15 @@ int leave_out_empty(const lanes::EmptySpace& empty, const lanes::RayCourse& cour
         free = hn::Min(free, hn::Sub(hn::Load(d, course.skippable.v + r), hn::Set(d, k)));
         least = hn::Min(least, hn::IfThenElse(goes_on, free, hn::Set(d, most)));
     }
-    return std::max(0, hn::GetLane(hn::MinOfLanes(d, least)));
+    const int left_out = std::max(0, hn::GetLane(hn::MinOfLanes(d, least)));
+    for (int r = 0; r < kRays; r += kLanes) {
+        const auto slabs = hn::Min(hn::Max(hn::Sub(hn::Load(d, rays.slabs.v + r), hn::Set(d, k)), zero),
+                                   hn::Set(d, left_out));
+        const auto active = hn::Gt(hn::Load(d, pixels.active.v + r), zero);
+        const auto samples = hn::Load(d, pixels.samples.v + r);
+        hn::Store(hn::Add(samples, hn::IfThenElseZero(active, slabs)), d, pixels.samples.v + r);
+    }
+    return left_out;
 }
 
 template <class T>

@@ -43,6 +43,32 @@ KnownRescales known_of(Stage... stage) {
     return all.known;
 }
 
+// Blocks that a slab's two ends may lie apart; 0 where one sample classifies it.
+int slab_reach(const Plan& plan) {
+    if (!plan.needs_back) return 0;
+    // Its far end may be off by what rounding V adds up to.
+    const double drift =
+        std::ldexp(static_cast<double>(-plan.location.low[0]), -plan.location.common_fraction);
+    return static_cast<int>(std::ceil(std::min((plan.scene.sampling.step + drift) / kBlock, 1e6)));
+}
+
+// Whether rays that leave out empty space may meet a block of cells: they still run through what lies within
+// a batch of something visible.
+bool may_be_met(const EmptySpace& empty, const Index3& cell_blocks, std::int64_t block) {
+    constexpr int kBits = CellBlocks::kBits - kBlockBits;
+    static_assert(kBits >= 0);
+    const Index3 low(block % cell_blocks.x << kBits, block / cell_blocks.x % cell_blocks.y << kBits,
+                     block / (cell_blocks.x * cell_blocks.y) << kBits);
+    const auto end = [&](std::int64_t from, std::int64_t count) {
+        return std::min(from + (1 << kBits), count);
+    };
+    for (auto z = low.z; z < end(low.z, empty.blocks.z); ++z)
+        for (auto y = low.y; y < end(low.y, empty.blocks.y); ++y)
+            for (auto x = low.x; x < end(low.x, empty.blocks.x); ++x)
+                if (empty.at(x, y, z) <= kSteps >> kBlockBits) return true;
+    return false;
+}
+
 std::int64_t free_memory() {
     return std::int64_t{sysconf(_SC_AVPHYS_PAGES)} * sysconf(_SC_PAGESIZE);
 }
@@ -101,14 +127,10 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
 
 LaneRenderer::LaneRenderer(const Plan& plan, const RenderOptions& options)
     : plan_(plan), target_(find_target(options.target)), ways_(ways_of(plan)) {
-    // A slab's two ends must lie in neighbouring blocks; its far one may be off by what V's rounding adds up
-    // to.
-    const double drift =
-        std::ldexp(static_cast<double>(-plan.location.low[0]), -plan.location.common_fraction);
-    const bool reachable = !plan.needs_back || plan.scene.sampling.step + drift <= kBlock;
-    if (options.skip && plan.skips_empty_space && reachable)
+    constexpr int kMostReach = 4;  // with longer slabs little is left out
+    if (options.skip && plan.skips_empty_space && slab_reach(plan) <= kMostReach)
         empty_ =
-            find_empty_space(*block_ranges(*plan.volume), plan.entries, plan.needs_back, plan.entry_reach);
+            find_empty_space(*block_ranges(*plan.volume), plan.entries, slab_reach(plan), plan.entry_reach);
     choose_layout(options);
     kernels_ = kernels_for(plan, ways_, voxels_, target_);
 }
@@ -133,12 +155,8 @@ void LaneRenderer::choose_layout(const RenderOptions& options) {
     }
     const std::int64_t room = options.layout_bytes >= 0 ? options.layout_bytes : free_memory() / 2;
     cells_ = cell_blocks(volume, room);
-    // Rays that leave out empty space still meet the blocks beside it.  Cells and empty space share their
-    // blocks.
-    static_assert(CellBlocks::kBits == kBlockBits);
-    cells_->build([&](std::int64_t block) {
-        return !empty_ || empty_->distance[static_cast<std::size_t>(block)] <= 1;
-    });
+    cells_->build(
+        [&](std::int64_t block) { return !empty_ || may_be_met(*empty_, cells_->blocks(), block); });
     if (cells_->room() > 0)
         voxels_.cells = cells_->data(), voxels_.blocks = cells_->blocks(), voxels_.slots = cells_->slots();
     layout_ = fmt::format("cells: 2x2x2 voxels side by side, {:.1f} MiB if all were met, room for {:.1f} MiB",
@@ -230,12 +248,9 @@ class PacketLoop {
 
     // Slabs that composite nothing; they count as composited, as in the model.
     int leave_out(int k) {
-        if (!empty_) return 0;
-        const int steps = kernels_.leave_out(*empty_, w_.course, w_.rays, w_.pixels, plan_.volume->dims, k,
-                                             w_.rays.most_slabs - k);
-        for (int r = 0; r < kRays && steps > 0; ++r)
-            if (w_.pixels.active.v[r]) w_.pixels.samples.v[r] += std::clamp(w_.rays.slabs.v[r] - k, 0, steps);
-        return steps;
+        return empty_ ? kernels_.leave_out(*empty_, w_.course, w_.rays, plan_.volume->dims, k,
+                                           w_.rays.most_slabs - k, w_.pixels)
+                      : 0;
     }
 
     Samples& here() { return w_.samples[current_]; }
