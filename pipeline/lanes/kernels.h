@@ -28,8 +28,8 @@ struct StageKernels {
     void (*set_course)(const Plan&, const EmptySpace&, const RayPacket&, RayCourse&) = nullptr;
     /// Steps from slab k that every ray of the packet can leave out: all of them stay in blocks where nothing
     /// is to be seen.  At most `most`.  They count as composited.
-    int (*leave_out)(const EmptySpace&, const RayCourse&, const RayPacket&, const Index3& dims, int k,
-                     int most, PixelPacket&) = nullptr;
+    int (*leave_out)(const EmptySpace&, const RayPacket&, const Index3& dims, int k, int most, RayCourse&,
+                     PixelPacket&) = nullptr;
     /// Rows [from, to): cells, weights and slab lengths.
     void (*locate)(const Plan&, const RayPacket&, int from, int to, Samples&) = nullptr;
     /// Rows [from, to): where the voxels lie, and a request to memory for them.

@@ -98,6 +98,7 @@ void set_course(const Plan& plan, const lanes::EmptySpace& empty, const lanes::R
         hn::Store(
             hn::IfThenElse(hn::Gt(distance, hn::Zero(d)), hn::Set(d, std::numeric_limits<Word>::max()), last),
             d, course.skippable.v + r);
+        hn::Store(hn::Zero(d), d, course.free_until.v + r);
     }
 }
 

@@ -256,9 +256,10 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
 // ------------------------------------------------------------------------------------------------ empty
 // space
 
-int leave_out_empty(const lanes::EmptySpace& empty, const lanes::RayCourse& course,
-                    const lanes::RayPacket& rays, const Index3& dims, int k, int most,
-                    lanes::PixelPacket& pixels) {
+/// How many samples from number `at` on, of each ray, lie in empty blocks: the one at `at` and those up to
+/// the far side of the empty blocks around it.  0 or less where that one may not be left out.
+auto empty_ahead(const lanes::EmptySpace& empty, const lanes::RayCourse& course, const Index3& dims, int r,
+                 hn::Vec<hn::ScalableTag<Word>> at) {
     const hn::ScalableTag<float> df;
     const hn::ScalableTag<Word> d;
     const auto zero = hn::Zero(d), one = hn::Set(d, 1);
@@ -267,51 +268,66 @@ int leave_out_empty(const lanes::EmptySpace& empty, const lanes::RayCourse& cour
     const std::int64_t counts[3] = {empty.blocks.x, empty.blocks.y, empty.blocks.z};
     const Word strides[3] = {1, static_cast<Word>(empty.blocks.x),
                              static_cast<Word>(empty.blocks.x * empty.blocks.y)};
-    auto least = hn::Set(d, most);
+    const auto number = hn::ConvertTo(df, at);
+    hn::Vec<decltype(df)> p[3], low_side[3];  // where the ray is, and the lower face of its block there
+    auto index = zero;
+    auto beside = hn::Gt(zero, zero);  // a sample may lie in the next block
+    for (int a = 0; a < 3; ++a) {
+        p[a] = hn::MulAdd(number, hn::Load(df, course.step[a].v + r), hn::Load(df, course.first[a].v + r));
+        p[a] = hn::Min(hn::Max(p[a], hn::Zero(df)), hn::Set(df, float(dims[a] - 1)));
+        const auto last = hn::Set(d, static_cast<Word>(counts[a] - 1));
+        const auto block = hn::Min(hn::ShiftRight<lanes::kBlockBits>(hn::ConvertTo(d, p[a])), last);
+        low_side[a] = hn::Mul(hn::ConvertTo(df, block), side);
+        const auto inside = hn::Sub(p[a], low_side[a]);
+        const auto near_low = hn::And(hn::RebindMask(d, hn::Lt(inside, margin)), hn::Gt(block, zero));
+        const auto near_high = hn::And(hn::RebindMask(d, hn::Gt(inside, inner_side)), hn::Lt(block, last));
+        beside = hn::Or(beside, hn::Or(near_low, near_high));
+        index = hn::Add(index, hn::Mul(block, hn::Set(d, strides[a])));
+    }
+    auto distance = hn::And(hn::GatherOffset(d, reinterpret_cast<const Word*>(empty.distance.data()), index),
+                            hn::Set(d, 0xff));
+    distance = hn::Sub(distance, hn::IfThenElseZero(beside, one));
+    // To the far side of the empty blocks ahead.
+    const auto empty_side = hn::Mul(hn::ConvertTo(df, distance), side);
+    auto steps = hn::Set(df, 1e6F);
+    for (int a = 0; a < 3; ++a) {
+        const auto up = hn::Sub(hn::Add(low_side[a], empty_side), p[a]);
+        const auto down = hn::Sub(p[a], hn::Sub(hn::Add(low_side[a], side), empty_side));
+        const auto backwards = hn::Lt(hn::Load(df, course.step[a].v + r), hn::Zero(df));
+        const auto way = hn::Sub(hn::IfThenElse(backwards, down, up), margin);
+        steps = hn::Min(steps, hn::Mul(way, hn::Load(df, course.pace[a].v + r)));
+    }
+    // The last sample inside is left out, too: the next one is looked at anew.
+    const auto free = hn::Add(hn::ConvertTo(d, hn::Max(steps, hn::Zero(df))), one);
+    return hn::IfThenElseZero(hn::Gt(distance, zero),
+                              hn::Min(free, hn::Sub(hn::Load(d, course.skippable.v + r), at)));
+}
+
+int leave_out_empty(const lanes::EmptySpace& empty, const lanes::RayPacket& rays, const Index3& dims, int k,
+                    int most, lanes::RayCourse& course, lanes::PixelPacket& pixels) {
+    const hn::ScalableTag<Word> d;
+    const auto zero = hn::Zero(d), here = hn::Set(d, k);
+    auto least = hn::Set(d, k + most);  // the first sample that stays, in every lane
     for (int r = 0; r < kRays; r += kLanes) {
         const auto goes_on = hn::And(hn::Gt(hn::Load(d, pixels.active.v + r), zero),
-                                     hn::Gt(hn::Load(d, rays.slabs.v + r), hn::Set(d, k)));
-        hn::Vec<decltype(df)> p[3], low_side[3];  // where the ray is, and the lower face of its block there
-        auto index = zero;
-        auto beside = hn::Gt(zero, zero);  // a sample may lie in the next block
-        for (int a = 0; a < 3; ++a) {
-            p[a] = hn::MulAdd(hn::Set(df, float(k)), hn::Load(df, course.step[a].v + r),
-                              hn::Load(df, course.first[a].v + r));
-            p[a] = hn::Min(hn::Max(p[a], hn::Zero(df)), hn::Set(df, float(dims[a] - 1)));
-            const auto last = hn::Set(d, static_cast<Word>(counts[a] - 1));
-            const auto block = hn::Min(hn::ShiftRight<lanes::kBlockBits>(hn::ConvertTo(d, p[a])), last);
-            low_side[a] = hn::Mul(hn::ConvertTo(df, block), side);
-            const auto inside = hn::Sub(p[a], low_side[a]);
-            const auto near_low = hn::And(hn::RebindMask(d, hn::Lt(inside, margin)), hn::Gt(block, zero));
-            const auto near_high =
-                hn::And(hn::RebindMask(d, hn::Gt(inside, inner_side)), hn::Lt(block, last));
-            beside = hn::Or(beside, hn::Or(near_low, near_high));
-            index = hn::Add(index, hn::Mul(block, hn::Set(d, strides[a])));
+                                     hn::Gt(hn::Load(d, rays.slabs.v + r), here));
+        // Each ray on its own, from where it was seen to be free to the first sample that is not.
+        auto until = hn::Max(hn::Load(d, course.free_until.v + r), here);
+        auto looks = hn::And(goes_on, hn::Lt(until, least));
+        while (!hn::AllFalse(d, looks)) {
+            const auto ahead = empty_ahead(empty, course, dims, r, until);
+            const auto stops = hn::AndNot(hn::Gt(ahead, zero), looks);
+            until = hn::Add(until, hn::IfThenElseZero(hn::AndNot(stops, looks), ahead));
+            if (!hn::AllFalse(d, stops)) least = hn::MinOfLanes(d, hn::IfThenElse(stops, until, least));
+            looks = hn::And(hn::AndNot(stops, looks), hn::Lt(until, least));
         }
-        auto distance =
-            hn::And(hn::GatherOffset(d, reinterpret_cast<const Word*>(empty.distance.data()), index),
-                    hn::Set(d, 0xff));
-        distance = hn::Sub(distance, hn::IfThenElseZero(beside, one));
-        if (!hn::AllFalse(d, hn::And(goes_on, hn::Lt(distance, one)))) return 0;
-        // To the far side of the empty blocks ahead.
-        const auto empty_side = hn::Mul(hn::ConvertTo(df, distance), side);
-        auto steps = hn::Set(df, float(most));
-        for (int a = 0; a < 3; ++a) {
-            const auto up = hn::Sub(hn::Add(low_side[a], empty_side), p[a]);
-            const auto down = hn::Sub(p[a], hn::Sub(hn::Add(low_side[a], side), empty_side));
-            const auto backwards = hn::Lt(hn::Load(df, course.step[a].v + r), hn::Zero(df));
-            const auto way = hn::Sub(hn::IfThenElse(backwards, down, up), margin);
-            steps = hn::Min(steps, hn::Mul(way, hn::Load(df, course.pace[a].v + r)));
-        }
-        // The last sample inside is left out, too: the next one is looked at anew.
-        auto free = hn::Add(hn::ConvertTo(d, hn::Max(steps, hn::Zero(df))), one);
-        free = hn::Min(free, hn::Sub(hn::Load(d, course.skippable.v + r), hn::Set(d, k)));
-        least = hn::Min(least, hn::IfThenElse(goes_on, free, hn::Set(d, most)));
+        hn::Store(until, d, course.free_until.v + r);
     }
-    const int left_out = std::max(0, hn::GetLane(hn::MinOfLanes(d, least)));
+    const int left_out = hn::GetLane(least) - k;
+    if (left_out == 0) return 0;
     for (int r = 0; r < kRays; r += kLanes) {
-        const auto slabs = hn::Min(hn::Max(hn::Sub(hn::Load(d, rays.slabs.v + r), hn::Set(d, k)), zero),
-                                   hn::Set(d, left_out));
+        const auto slabs =
+            hn::Min(hn::Max(hn::Sub(hn::Load(d, rays.slabs.v + r), here), zero), hn::Set(d, left_out));
         const auto active = hn::Gt(hn::Load(d, pixels.active.v + r), zero);
         const auto samples = hn::Load(d, pixels.samples.v + r);
         hn::Store(hn::Add(samples, hn::IfThenElseZero(active, slabs)), d, pixels.samples.v + r);

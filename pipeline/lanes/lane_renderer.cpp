@@ -248,8 +248,8 @@ class PacketLoop {
 
     // Slabs that composite nothing; they count as composited, as in the model.
     int leave_out(int k) {
-        return empty_ ? kernels_.leave_out(*empty_, w_.course, w_.rays, plan_.volume->dims, k,
-                                           w_.rays.most_slabs - k, w_.pixels)
+        return empty_ ? kernels_.leave_out(*empty_, w_.rays, plan_.volume->dims, k, w_.rays.most_slabs - k,
+                                           w_.course, w_.pixels)
                       : 0;
     }
 

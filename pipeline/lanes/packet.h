@@ -49,6 +49,7 @@ struct alignas(64) RayCourse {
     RealRow first[3], step[3];  // voxels
     RealRow pace[3];            // steps a voxel
     Row skippable;              // no sample from this one on can be left out
+    Row free_until;             // samples before this one are known to lie in empty space
     float margin;               // voxels a sample may lie off its course
 };
 
