@@ -220,6 +220,16 @@ template <KnownRescales K>
 HWY_INLINE WideLanes<K> max(const WideLanes<K>& a, const WideLanes<K>& b) {
     return {hn::Max(a.low, b.low), hn::Max(a.high, b.high)};
 }
+template <KnownRescales K>
+HWY_INLINE bool any_positive(const WideLanes<K>& x) {
+    const hn::ScalableTag<double> d;
+    const auto most = hn::Max(x.low, x.high);
+    return !hn::AllFalse(d, hn::Lt(hn::Zero(d), most));
+}
+template <KnownRescales K>
+HWY_INLINE bool any_positive(Lanes<std::int64_t, K> x) {
+    return any(constant<Lanes<std::int64_t, K>>(0) < x);
+}
 /// An estimate, off by one at most, and its exact rest: the product of either half of the estimate with the
 /// denominator has 53 bits at most (range.cpp notes it).  A result beyond 32 bits saturates.
 template <KnownRescales K>

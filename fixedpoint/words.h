@@ -434,6 +434,14 @@ template <>
 struct WideOf<Range> {
     using Type = WideRange;
 };
+/// Whether any of the numbers side by side is above zero.
+template <class N>
+constexpr bool any_positive(const N& x) {
+    return any(constant<N>(0) < x);
+}
+constexpr bool any_positive(const WideRange&) {
+    return true;
+}
 WideRange widen(Range x);
 WideRange wide_sum(Range high, int bits, Range low);
 WideRange wide_product(Range a, Range b);

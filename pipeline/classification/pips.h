@@ -106,12 +106,13 @@ HWY_INLINE Slab<W> classify(const PowerSeriesOfOrder1& m, const PrefixSample<W>&
     const Wide<W> straight = prefix_difference(front, end, 0, bits);
     Wide<W> depth = straight;
     if (m.prefix.curved) depth = shift_left(straight, bits + 1) - (bend_at(m, end) - bend_at(m, front));
-    Slab<W> slab;
-    slab.alpha =
-        opacity_of_depth(m.prefix.entries.opacity,
-                         depth_of(m.prefix, absolute(depth), widen(max(cut.span, constant<W>(1))), length));
+    depth = absolute(depth);
     const W zero = constant<W>(0), one = constant<W>(m.one_ratio);
-    slab.color = {zero, zero, zero};
+    Slab<W> slab{{zero, zero, zero}, zero};
+    if (any_positive(depth))
+        slab.alpha =
+            opacity_of_depth(m.prefix.entries.opacity,
+                             depth_of(m.prefix, depth, widen(max(cut.span, constant<W>(1))), length));
     if (any(zero < slab.alpha)) {  // of what is not seen the colour is any
         const Wide<W> some = max(absolute(straight), widen(constant<W>(1)));
         for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
