@@ -171,6 +171,39 @@ constexpr unsigned rows_of(GradientRule rule) {
     return rule == GradientRule::analytic ? 0x0660U : rule == GradientRule::central ? 0x6ff6U : 0xffffU;
 }
 
+/// Four voxels along x at each lane's element of a row, as two words of pairs: one gather of four bytes or
+/// two of eight.
+#if HWY_TARGET != HWY_SCALAR
+constexpr bool kGathersRows = true;
+HWY_INLINE auto gathered_row(const std::uint8_t* row, hn::Vec<hn::ScalableTag<Word>> first) {
+    const hn::ScalableTag<Word> d;
+    const hn::RebindToUnsigned<decltype(d)> du;
+    const auto four = hn::GatherOffset(d, reinterpret_cast<const Word*>(row), first);
+    const auto upper = hn::BitCast(d, hn::ShiftRight<16>(hn::BitCast(du, four)));
+    const auto spread = [&](auto two) HWY_ATTR {
+        return hn::And(hn::Or(two, hn::ShiftLeft<8>(two)), hn::Set(d, 0x00ff00ff));
+    };
+    return std::array<hn::Vec<decltype(d)>, 2>{spread(hn::And(four, hn::Set(d, 0xffff))), spread(upper)};
+}
+HWY_INLINE auto gathered_row(const std::uint16_t* row, hn::Vec<hn::ScalableTag<Word>> first) {
+    const hn::ScalableTag<Word> d;
+    const hn::ScalableTag<std::int64_t> d64;
+    const hn::Half<decltype(d)> half;
+    const auto fours = [&](auto part) HWY_ATTR {
+        const auto offset = hn::ShiftLeft<1>(hn::PromoteTo(d64, part));
+        return hn::BitCast(d, hn::GatherOffset(d64, reinterpret_cast<const std::int64_t*>(row), offset));
+    };
+    const auto low = fours(hn::LowerHalf(half, first)), high = fours(hn::UpperHalf(half, first));
+    return std::array<hn::Vec<decltype(d)>, 2>{hn::ConcatEven(d, high, low), hn::ConcatOdd(d, high, low)};
+}
+#else
+constexpr bool kGathersRows = false;
+template <class T>
+std::array<hn::Vec<hn::ScalableTag<Word>>, 2> gathered_row(const T*, hn::Vec<hn::ScalableTag<Word>>) {
+    return {};
+}
+#endif
+
 template <class T>
 void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
     const Volume& volume = *plan.volume;
@@ -195,14 +228,7 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
             const int here = std::min(kLanes, count - at);  // lanes behind the last sample repeat the first
             outside = hn::And(outside, hn::FirstN(d, static_cast<std::size_t>(here)));
             if (hn::AllFalse(d, outside)) {
-                const T* low[kLanes];
-                for (int lane = 0; lane < kLanes; ++lane) {
-                    const int i = lane < here ? at + lane : at;
-                    low[lane] = data + (cell[0].v[i] - 1) +
-                                n.x * ((cell[1].v[i] - 1) + n.y * std::int64_t{cell[2].v[i] - 1});
-                }
-                if (sizeof(T) == 1 && offsets_fit) {
-                    // Four bytes are one gather.
+                if (kGathersRows && offsets_fit) {
                     auto first = hn::Sub(hn::Load(d, cell[2].v + at), hn::Set(d, 1));
                     for (const int a : {1, 0})
                         first = hn::Add(hn::Mul(first, hn::Set(d, static_cast<Word>(n[a]))),
@@ -211,17 +237,17 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
                     first = hn::IfThenElseZero(hn::FirstN(d, static_cast<std::size_t>(here)), first);
                     for (int row = 0; row < 16; ++row) {
                         if (!(rows >> row & 1)) continue;
-                        const T* line = data + n.x * (row % 4 + n.y * (row / 4));
-                        const auto four = hn::GatherOffset(d, reinterpret_cast<const Word*>(line), first);
-                        const auto spread = [&](auto two) {
-                            return hn::And(hn::Or(two, hn::ShiftLeft<8>(two)), hn::Set(d, 0x00ff00ff));
-                        };
-                        const hn::RebindToUnsigned<decltype(d)> du;
-                        const auto upper = hn::BitCast(d, hn::ShiftRight<16>(hn::BitCast(du, four)));
-                        hn::Store(spread(hn::And(four, hn::Set(d, 0xffff))), d, pair[2 * row].v + at);
-                        hn::Store(spread(upper), d, pair[2 * row + 1].v + at);
+                        const auto two = gathered_row(data + n.x * (row % 4 + n.y * (row / 4)), first);
+                        hn::Store(two[0], d, pair[2 * row].v + at);
+                        hn::Store(two[1], d, pair[2 * row + 1].v + at);
                     }
                     continue;
+                }
+                const T* low[kLanes];
+                for (int lane = 0; lane < kLanes; ++lane) {
+                    const int i = lane < here ? at + lane : at;
+                    low[lane] = data + (cell[0].v[i] - 1) +
+                                n.x * ((cell[1].v[i] - 1) + n.y * std::int64_t{cell[2].v[i] - 1});
                 }
                 for (int row = 0; row < 16; ++row) {
                     if (!(rows >> row & 1)) continue;
