@@ -19,7 +19,6 @@ namespace {
 constexpr int kMostRows = 8192;       // sub-entries: above, the tables outgrow the caches by far
 constexpr int kMostDeepRows = 32768;  // where an entry is deeper than 8: 2 rows err by 39 LSB8, 8 by 5
 constexpr std::int64_t kMostValues = 8 << 20;
-constexpr int kInverseBits = 24;
 
 /// One entry of the tables: its depth, and its light in every channel.
 struct Step {
@@ -280,7 +279,6 @@ MomentSeries build_moment_series(const ClassificationInputs& in) {
     const Spec word{{1, m.word_fraction, false}, moment.rounding, Overflow::sat};
     fill_moments(m, fine, word, in.keeps_exact);
     m.moments.wire = wire;
-    m.resolved = std::int64_t{1} << (m.word_fraction - std::max(0, m.word_fraction - 10) / m.order);
     m.to_part = Rescale(m.word_fraction + in.input_fraction - m.sub_entry_bits, word, wire);
     m.to_product = Rescale(2 * m.word_fraction, word, wire);
     m.to_mean = Rescale(m.word_fraction + kInverseBits, word, wire);

@@ -19,10 +19,32 @@
 
 #include "pipeline/classification/prefix.h"
 
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <string>
+
 namespace squint {
 
 inline constexpr int kMostMomentOrder = 5;
 inline constexpr int kPieces = 4;  // of a slab that LEG cuts
+inline constexpr int kInverseBits = 24;
+
+using MomentSquare = std::array<std::array<std::int64_t, kMostMomentOrder>, kMostMomentOrder>;
+/// P_j(2y - 1) = sum_k kShiftedLegendre[j][k] y^k.
+inline constexpr MomentSquare kShiftedLegendre{
+    {{1, 0, 0, 0, 0}, {-1, 2, 0, 0, 0}, {1, -6, 6, 0, 0}, {-1, 12, -30, 20, 0}, {1, -20, 90, -140, 70}}};
+/// The moment k for which L_k is zero is sum_i kSmooth[k][i] 2^-24 times moment i, i < k.
+inline constexpr MomentSquare kSmooth = [] {
+    MomentSquare smooth{};
+    for (std::size_t k = 1; k < smooth.size(); ++k)
+        for (std::size_t i = 0; i < k; ++i) {
+            const std::int64_t twice =
+                -(kShiftedLegendre[k][i] << (kInverseBits + 1)) / kShiftedLegendre[k][k];
+            smooth[k][i] = (twice + 1) >> 1;
+        }
+    return smooth;
+}();
 
 struct MomentSeries {
     static constexpr bool kPremultiplied = false;
@@ -37,9 +59,8 @@ struct MomentSeries {
     int weight_fraction = 18;
     int row_bits = 10;  // rows of `weights` are 2^-row_bits apart
     int depth_fraction = 0;
-    bool splits = false;        // slabs deeper than `limit` are cut (LEG), or take order 1 (PIPS)
-    std::int64_t limit = 0;     // raw, of slab_depth
-    std::int64_t resolved = 0;  // depth in a block, raw, whose powers the words hold to 2^-10
+    bool splits = false;     // slabs deeper than `limit` are cut (LEG), or take order 1 (PIPS)
+    std::int64_t limit = 0;  // raw, of slab_depth
     std::array<std::int64_t, 3> lowest{}, highest{};       // of the entries' colours
     std::array<std::int64_t, kMostMomentOrder> inverse{};  // 2^24 / (k + 1)
     Rescale to_part;                                       // within a sub-entry
@@ -62,6 +83,10 @@ struct MomentSeries {
     }
     void describe(ClassificationReport& report) const;
 };
+/// The depth in a block, raw, from which on words of `fraction` bits hold its moment k to 2^-10.
+constexpr std::int64_t resolved_depth(int fraction, std::size_t k) {
+    return std::int64_t{1} << (fraction - std::max(0, fraction - 10) / (static_cast<int>(k) + 1));
+}
 /// PIPS(2 to 5) and LEG(2 to 4).  Throws InputError for other orders.
 MomentSeries build_moment_series(const ClassificationInputs& inputs);
 
@@ -169,12 +194,14 @@ HWY_INLINE Powers<W> mean_moments(const MomentSeries& m, const SlabParts<W>& p, 
         for (std::size_t k = count - 1; k >= pass; --k)
             moment[k] = clamp(moment[k] - quantise(p.a.next * moment[k - 1], m.to_product), zero, one);
     const W whole = max(p.whole, constant<W>(1));
-    // Where the words hold too little of a thin part's powers, its colour is its mean.
-    const auto thin = p.whole < constant<W>(m.resolved);
+    // Of a thin part the words hold the lower moments alone.
     for (std::size_t k = 0; k < count; ++k) {
         for (std::size_t times = 0; times <= k; ++times) moment[k] = share_of(m, moment[k], whole);
-        if (k > 0)
-            moment[k] = select(thin, quantise(moment[0] * constant<W>(m.inverse[k]), m.to_mean), moment[k]);
+        const auto thin = p.whole < constant<W>(resolved_depth(m.word_fraction, k));
+        if (k == 0 || !any(thin)) continue;
+        W sum = moment[0] * constant<W>(kSmooth[k][0]);
+        for (std::size_t i = 1; i < k; ++i) sum = sum + moment[i] * constant<W>(kSmooth[k][i]);
+        moment[k] = select(thin, clamp(quantise(max(sum, zero), m.to_mean), zero, one), moment[k]);
     }
 
     // The three parts, one behind the other.
@@ -189,16 +216,14 @@ HWY_INLINE Powers<W> mean_moments(const MomentSeries& m, const SlabParts<W>& p, 
     return moment;
 }
 
-/// L_j for j >= 1 from the moments int c y^k dy.
+/// L_j from the moments int c y^k dy.
 template <class W>
 HWY_INLINE Powers<W> legendre_moments(const MomentSeries& m, const Powers<W>& mean) {
-    static constexpr std::int64_t kCoefficient[kMostMomentOrder][kMostMomentOrder] = {
-        {1, 0, 0, 0, 0}, {-1, 2, 0, 0, 0}, {1, -6, 6, 0, 0}, {-1, 12, -30, 20, 0}, {1, -20, 90, -140, 70}};
     const W one = constant<W>(std::int64_t{1} << m.word_fraction);
     Powers<W> result;
     for (std::size_t j = 0; j < static_cast<std::size_t>(m.order); ++j) {
-        W sum = mean[0] * constant<W>(kCoefficient[j][0]);
-        for (std::size_t k = 1; k <= j; ++k) sum = sum + mean[k] * constant<W>(kCoefficient[j][k]);
+        W sum = mean[0] * constant<W>(kShiftedLegendre[j][0]);
+        for (std::size_t k = 1; k <= j; ++k) sum = sum + mean[k] * constant<W>(kShiftedLegendre[j][k]);
         result[j] = clamp(sum, constant<W>(0) - one, one);
     }
     return result;

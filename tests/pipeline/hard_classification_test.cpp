@@ -305,6 +305,22 @@ TEST(HardClassification, EndsOneBitApartDoNotBlowUp) {
     }
 }
 
+// An entry 1.5 deep from black to white beside entries 20 deep, a 35th of its block's depth: the words hold
+// its moments but the last.  L_2 and L_3 are zero, and the held moment errs by 2^-10 of its part: 2 W_1 3
+// 2^-10 = 0.28 LSB8, W_1(1.5) = 0.19.  One mean colour is 22 off.
+TEST(HardClassification, APartThinInItsBlockKeepsTheMomentsThatWordsHold) {
+    Entries entries;
+    for (int i = 0; i < 256; ++i)
+        entries.entry.push_back({Vec3(i > 10, i > 10, i > 10), 0, i == 10 || i == 11 ? 3.0 : 40.0, false});
+    for (const int order : {2, 3, 4}) {
+        const Classifier c = make_classifier(entries, {Method::leg, order}, "default", 0, 0.5);
+        for (const auto& [front, back] : {std::pair{10.0, 11.0}, {11.0, 10.0}})
+            EXPECT_NEAR(c.slab(front, back).color.x, pre::exact_slab(entries, front, back, 0.5).color.x,
+                        0.28 / 255)
+                << order << ' ' << front;
+    }
+}
+
 // Beside spikes, walls and in noise T bends inside an entry, and so do its words: opacity is the exact one to
 // 2^-15 of its words and 2^-18 of T's; half an LSB8 where rows are so narrow that T is straight in them.
 // Colour is constant in a sub-entry: with 32 of them (8192 rows over 255 entries) it errs by 2/3 of the swing
