@@ -90,7 +90,7 @@ HWY_INLINE Wide<W> prefix_difference(const PrefixSample<W>& front, const PrefixS
     return wide_sum(back.sums[column] - front.sums[column], place_bits,
                     back.at.fraction * back.rises[column] - front.at.fraction * front.rises[column]);
 }
-/// What T's bend takes from it at a sample (curved_from).
+/// What T's bend takes from it at a sample (depth_at).
 template <class W>
 HWY_INLINE Wide<W> bend_at(const PowerSeriesOfOrder1& m, const PrefixSample<W>& s) {
     const std::int64_t one = std::int64_t{1} << m.prefix.place_bits();

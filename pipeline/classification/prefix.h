@@ -108,33 +108,30 @@ HWY_INLINE EntryPosition<W> sub_entry_position(const EntryLookup& e, int sub_ent
 ///
 ///     T(u) = T_i + u (T_(i+1) - T_i) - u (1 - u) / 2 (tau_(i+1) - tau_i),    0 <= u <= 1.
 template <class W>
-HWY_INLINE W curved_from(const PrefixLookup& p, const EntryPosition<W>& at, W straight) {
-    if (!p.curved) return straight;
+HWY_INLINE W depth_at(const PrefixLookup& p, const EntryPosition<W>& at) {
     const int bits = p.place_bits();
+    const W straight = prefix_at(p.depth, at, 0, bits);
+    if (!p.curved) return straight;
     const std::int64_t one = std::int64_t{1} << bits;
     const W hollow = within(at.fraction * (constant<W>(one) - at.fraction), 0, one * one / 4);
     return within(shift_left(straight, bits + 1) - hollow * gather(p.depth, at.entry, 1), 0,
                   (p.total + 1) << p.gained_bits());
-}
-template <class W>
-HWY_INLINE W depth_at(const PrefixLookup& p, const EntryPosition<W>& at) {
-    return curved_from(p, at, prefix_at(p.depth, at, 0, p.place_bits()));
 }
 
 /// A slab cut where it first meets an opaque entry: in either direction, both ends included.
 template <class W>
 struct CutSlab {
     EntryPosition<W> front, end;  // the translucent part
-    W front_input, end_input;     // its ends as inputs
-    W span;                       // |s_b - s_f| of the whole slab: the rate is kept
-    W wall;                       // 1 where an opaque entry ends it
+    W end_input;
+    W span;  // |s_b - s_f| of the whole slab: the rate is kept
+    W wall;  // 1 where an opaque entry ends it
     W wall_entry;
 };
 template <class W>
 HWY_INLINE CutSlab<W> cut_at_wall(const PrefixLookup& p, W front, W back) {
     const int bits = p.entries.input_fraction;
     const W zero = constant<W>(0), one = constant<W>(1);
-    CutSlab<W> cut{entry_position(p.entries, front), {}, front, back, absolute(back - front), zero, zero};
+    CutSlab<W> cut{entry_position(p.entries, front), {}, back, absolute(back - front), zero, zero};
     W end = back;
     if (p.predicts) {
         const auto ascending = front < back;
@@ -152,14 +149,6 @@ HWY_INLINE CutSlab<W> cut_at_wall(const PrefixLookup& p, W front, W back) {
     return cut;
 }
 
-/// The optical depth of a cut slab, and T's difference that it comes from.
-template <class W>
-struct SlabDepth {
-    EntryPosition<W> front, end;  // in rows of T
-    W straight;                   // |T(end) - T(front)| without T's bend between rows
-    W difference;                 // with it
-    W depth;                      // times length over span
-};
 /// The optical depth of a difference of T over a span of inputs, at least one, for a slab of `length`.  N:
 /// the word or its Wide.
 template <class N, class W>
@@ -169,18 +158,16 @@ HWY_INLINE W depth_of(const PrefixLookup& p, const N& difference, const N& span,
     if (any(shorter)) depth = select(shorter, quantise(depth * length, p.to_shorter), depth);
     return depth;
 }
+/// The optical depth of a cut slab, and T's difference that it comes from.
+template <class W>
+struct SlabDepth {
+    W difference, depth;
+};
+/// Where an entry has one row.
 template <class W>
 HWY_INLINE SlabDepth<W> slab_depth(const PrefixLookup& p, const CutSlab<W>& cut, W length) {
-    SlabDepth<W> d;
-    d.front = sub_entry_position(p.entries, p.sub_entry_bits, cut.front_input);
-    d.end = sub_entry_position(p.entries, p.sub_entry_bits, cut.end_input);
-    const W front = prefix_at(p.depth, d.front, 0, p.place_bits()),
-            end = prefix_at(p.depth, d.end, 0, p.place_bits());
-    d.straight = absolute(end - front);
-    d.difference =
-        p.curved ? absolute(curved_from(p, d.end, end) - curved_from(p, d.front, front)) : d.straight;
-    d.depth = depth_of(p, d.difference, max(cut.span, constant<W>(1)), length);
-    return d;
+    const W difference = absolute(depth_at(p, cut.end) - depth_at(p, cut.front));
+    return {difference, depth_of(p, difference, max(cut.span, constant<W>(1)), length)};
 }
 
 /// The straight colour of the wall that ends a slab.
