@@ -16,10 +16,10 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-void SampleStretch(const SampleValues& values, const CurveStretch& s, int first, int end, double* result) {
+void SampleStretch(const SampleValues& values, const CurveStretch& s, int first, int end,
+                   std::span<double* const> results) {
     const hn::ScalableTag<double> d;
     const auto from = hn::Set(d, s.from), width = hn::Set(d, s.to - s.from);
-    const auto before = hn::Set(d, s.before), rise = hn::Set(d, s.after - s.before);
     const auto scale = hn::Set(d, values.scale), spacing = hn::Set(d, values.spacing),
                offset = hn::Set(d, values.offset);
     const int lanes = static_cast<int>(hn::Lanes(d));
@@ -28,10 +28,16 @@ void SampleStretch(const SampleValues& values, const CurveStretch& s, int first,
     for (; i + lanes <= end; i += lanes, index = hn::Add(index, hn::Set(d, static_cast<double>(lanes)))) {
         const auto value = hn::Add(hn::Mul(scale, hn::Mul(index, spacing)), offset);
         const auto weight = hn::Div(hn::Sub(value, from), width);
-        hn::StoreU(hn::Add(before, hn::Mul(rise, weight)), d, result + i);
+        for (std::size_t c = 0; c < results.size(); ++c) {
+            const auto rise = hn::Set(d, s.after[c] - s.before[c]);
+            hn::StoreU(hn::Add(hn::Set(d, s.before[c]), hn::Mul(rise, weight)), d, results[c] + i);
+        }
     }
-    for (; i < end; ++i)
-        result[i] = s.before + (s.after - s.before) * ((values(i) - s.from) / (s.to - s.from));
+    for (; i < end; ++i) {
+        const double weight = (values(i) - s.from) / (s.to - s.from);
+        for (std::size_t c = 0; c < results.size(); ++c)
+            results[c][i] = s.before[c] + (s.after[c] - s.before[c]) * weight;
+    }
 }
 
 }  // namespace
@@ -45,8 +51,8 @@ namespace squint {
 HWY_EXPORT(SampleStretch);
 
 void sample_stretch(const SampleValues& values, const CurveStretch& stretch, int first, int end,
-                    std::span<double> result) {
-    HWY_DYNAMIC_DISPATCH(SampleStretch)(values, stretch, first, end, result.data());
+                    std::span<double* const> results) {
+    HWY_DYNAMIC_DISPATCH(SampleStretch)(values, stretch, first, end, results);
 }
 
 }  // namespace squint

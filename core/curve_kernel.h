@@ -12,15 +12,15 @@ struct SampleValues {
     double operator()(int i) const { return scale * (i * spacing) + offset; }
 };
 
-/// Two neighbouring control points: values, and what one of the curve's channels is there.
+/// Two neighbouring control points: values, and what a few of the curve's channels are there.
 struct CurveStretch {
     double from, to;
-    double before, after;
+    std::span<const double> before, after;  // channel by channel
 };
 
 /// result[i] = before + (after - before) (value - from) / (to - from) for first <= i < end, in these very
-/// operations: the bits of one sample at a time.
+/// operations: the bits of one sample at a time.  results: where each channel's sample 0 lies.
 void sample_stretch(const SampleValues& values, const CurveStretch& stretch, int first, int end,
-                    std::span<double> result);
+                    std::span<double* const> results);
 
 }  // namespace squint

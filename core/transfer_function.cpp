@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <memory>
@@ -41,11 +42,11 @@ class Curve {
     std::size_t after_ = 0;  // the first point whose value is greater
 };
 
-/// Curve's values at every sample, a stretch between two points at a time.
-template <class Point, class Part>
-void sample_curve(const std::vector<Point>& points, const SampleValues& values, const Part& part,
-                  std::span<double> result) {
-    const int count = static_cast<int>(result.size());
+/// Curve's values at `count` samples, a stretch between two points at a time.  parts(point): its channels;
+/// results: where each channel's samples go.
+template <class Point, class Parts>
+void sample_curve(const std::vector<Point>& points, const SampleValues& values, int count, const Parts& parts,
+                  std::span<double* const> results) {
     const bool ascending = values.scale > 0;
     // The first sample that does not stand before `value` as samples run.
     const auto first_at = [&](double value, int from) {
@@ -58,24 +59,34 @@ void sample_curve(const std::vector<Point>& points, const SampleValues& values, 
         return low;
     };
     int done = 0;
-    const auto flat = [&](int end, double value) {
-        std::fill(result.begin() + done, result.begin() + std::max(done, end), value),
-            done = std::max(done, end);
+    const auto flat = [&](int end, const Point& p) {
+        if (end <= done) return;
+        for (std::size_t c = 0; c < results.size(); ++c)
+            std::fill(results[c] + done, results[c] + end, parts(p)[c]);
+        done = end;
     };
     const int last = static_cast<int>(points.size()) - 1;
     const auto point = [&](int k) -> const Point& { return points[static_cast<std::size_t>(k)]; };
-    if (ascending)
-        flat(first_at(point(0).value, 0), part(point(0)));
-    else
-        flat(first_at(point(last).value, 0), part(point(last)));
+    const Point &first = point(ascending ? 0 : last), &final = point(ascending ? last : 0);
+    flat(first_at(first.value, 0), first);
     for (int k = 0; k < last; ++k) {
         const int at = ascending ? k : last - 1 - k;  // between points `at` and `at` + 1
         const Point &a = point(at), &b = point(at + 1);
         const int end = first_at(ascending ? b.value : a.value, done);
         if (end > done)
-            sample_stretch(values, {a.value, b.value, part(a), part(b)}, done, end, result), done = end;
+            sample_stretch(values, {a.value, b.value, parts(a), parts(b)}, done, end, results), done = end;
     }
-    flat(count, part(ascending ? point(last) : point(0)));
+    flat(count, final);
+}
+
+/// -ln(1 - alpha) / unit_distance of alphas capped.
+void extinction_of(std::span<const double> alpha, double unit_distance, std::span<double> extinction) {
+    for (std::size_t i = 0; i < alpha.size(); ++i)
+        extinction[i] = -std::min(alpha[i], kLargestTranslucentAlpha);
+    portable::log1p_each(extinction, extinction);
+    for (double& e : extinction) e = 0 - e;  // never a negative zero
+    if (unit_distance != 1)
+        for (double& e : extinction) e /= unit_distance;
 }
 
 bool in_unit_range(double x) {
@@ -145,25 +156,24 @@ Entries sample_entries(const TransferFunction& function, const Volume& volume) {
     entries.scalars_per_entry = static_cast<double>(std::max<std::int64_t>(levels - 1, 1)) / (count - 1);
     const SampleValues values{volume.value_scale, entries.scalars_per_entry, volume.value_offset};
     const auto size = static_cast<std::size_t>(count);
-    // Red, green, blue, alpha, -alpha capped.
     const std::unique_ptr<double[]> sampled = std::make_unique_for_overwrite<double[]>(5 * size);
-    const auto column = [&](std::size_t c) { return std::span(sampled.get() + c * size, size); };
-    for (std::size_t c = 0; c < 3; ++c)
-        sample_curve(
-            function.color, values, [&](const ColorPoint& p) { return p.color[static_cast<int>(c)]; },
-            column(c));
+    double *const red = sampled.get(), *const green = red + size, *const blue = green + size,
+                  *const alpha = blue + size, *const extinction = alpha + size;
+    const std::array<double*, 3> colors{red, green, blue};
     sample_curve(
-        function.opacity, values, [](const OpacityPoint& p) { return p.alpha; }, column(3));
-    const std::span<double> red = column(0), green = column(1), blue = column(2), alpha = column(3),
-                            log = column(4);
-    for (std::size_t i = 0; i < size; ++i) log[i] = -std::min(alpha[i], kLargestTranslucentAlpha);
-    portable::log1p_each(log, log);
+        function.color, values, count, [](const ColorPoint& p) { return std::span(&p.color.x, 3); }, colors);
+    sample_curve(
+        function.opacity, values, count, [](const OpacityPoint& p) { return std::span(&p.alpha, 1); },
+        std::span(&alpha, 1));
+    extinction_of(std::span(alpha, size), function.unit_distance, std::span(extinction, size));
     entries.entry.reserve(size);
-    for (std::size_t i = 0; i < size; ++i)
-        entries.entry.push_back({{red[i], green[i], blue[i]},
-                                 alpha[i],
-                                 (0 - log[i]) / function.unit_distance,  // never a negative zero
-                                 alpha[i] == 1});
+    std::array<Entry, 64> block;  // in the cache: to set all of them to zero first takes as long as the rest
+    for (std::size_t i = 0; i < size; i += block.size()) {
+        const std::size_t end = std::min(size - i, block.size());
+        for (std::size_t k = 0, j = i; k < end; ++k, ++j)
+            block[k] = {{red[j], green[j], blue[j]}, alpha[j], extinction[j], alpha[j] == 1};
+        entries.entry.insert(entries.entry.end(), block.begin(), block.begin() + end);
+    }
     return entries;
 }
 

@@ -21,10 +21,11 @@ namespace {
 namespace hn = hwy::HWY_NAMESPACE;
 
 /// scale, low and high repeat after `period` values, a multiple of every vector's lanes.  False where a word
-/// needs more than 32 bits.
-bool QuantiseRows(const double* HWY_RESTRICT values, std::size_t count, const double* HWY_RESTRICT scale,
-                  const double* HWY_RESTRICT low, const double* HWY_RESTRICT high, std::size_t period,
-                  std::int32_t* HWY_RESTRICT words) {
+/// needs more than 32 bits, which without kMayBeWide the limits exclude.
+template <bool kMayBeWide>
+bool quantised(const double* HWY_RESTRICT values, std::size_t count, const double* HWY_RESTRICT scale,
+               const double* HWY_RESTRICT low, const double* HWY_RESTRICT high, std::size_t period,
+               std::int32_t* HWY_RESTRICT words) {
     const hn::ScalableTag<double> d;
     const hn::Rebind<std::int32_t, decltype(d)> half;
     const auto round = hn::Set(d, 0x1.8p52);
@@ -35,7 +36,7 @@ bool QuantiseRows(const double* HWY_RESTRICT values, std::size_t count, const do
         const auto limited = hn::Min(hn::Max(scaled, hn::LoadU(d, low + at)), hn::LoadU(d, high + at));
         const auto whole =
             hn::IfThenElseZero(hn::Eq(scaled, scaled), hn::Sub(hn::Add(limited, round), round));
-        smallest = hn::Min(smallest, whole), largest = hn::Max(largest, whole);
+        if constexpr (kMayBeWide) smallest = hn::Min(smallest, whole), largest = hn::Max(largest, whole);
         hn::StoreU(hn::DemoteTo(half, whole), half, words + i);
         at = at + hn::Lanes(d) == period ? 0 : at + hn::Lanes(d);
     }
@@ -48,6 +49,14 @@ bool QuantiseRows(const double* HWY_RESTRICT values, std::size_t count, const do
     }
     return hn::AllTrue(d,
                        hn::And(hn::Ge(smallest, hn::Set(d, -0x1p31)), hn::Lt(largest, hn::Set(d, 0x1p31))));
+}
+
+bool QuantiseRows(const double* HWY_RESTRICT values, std::size_t count, const double* HWY_RESTRICT scale,
+                  const double* HWY_RESTRICT low, const double* HWY_RESTRICT high, std::size_t period,
+                  std::int32_t* HWY_RESTRICT words) {
+    const bool narrow =
+        *std::min_element(low, low + period) >= -0x1p31 && *std::max_element(high, high + period) < 0x1p31;
+    return (narrow ? quantised<false> : quantised<true>)(values, count, scale, low, high, period, words);
 }
 
 /// False where a word has more than 16 bits.

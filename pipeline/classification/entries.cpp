@@ -93,7 +93,6 @@ EntryLookup build_entry_lookup(const ClassificationInputs& in) {
     lookup.matter.wire = static_cast<int>(Wire::table_extinction);
     lookup.input_fraction = in.input_fraction;
     lookup.last_segment = n - 2;
-    lookup.has_opaque = in.entries.any_opaque();
     // The square of an F-bit root has 2 F bits; a plain alpha has its own F.
     const bool rooted = in.settings.encoding == AlphaEncoding::sqrt_alpha;
     Spec stored = alpha;
@@ -102,18 +101,25 @@ EntryLookup build_entry_lookup(const ClassificationInputs& in) {
     const std::unique_ptr<double[]> numbers = std::make_unique_for_overwrite<double[]>(7 * size);
     const std::span<double> opacity(numbers.get(), size), seen(numbers.get() + size, 4 * size),
         matter(numbers.get() + 5 * size, 2 * size);
-    for (std::size_t i = 0; i < size; ++i) opacity[i] = -(in.entries.entry[i].extinction * in.step_world);
-    portable::expm1_each(opacity, opacity);
+    bool opaque = false;  // the entry before
     for (std::size_t i = 0; i < size; ++i) {
         const Entry& entry = in.entries.entry[i];
-        opacity[i] = -opacity[i];
-        for (int c = 0; c < 3; ++c) seen[4 * i + static_cast<std::size_t>(c)] = entry.color[c];
-        seen[4 * i + EntryLookup::alpha] =
-            rooted ? decoded_alpha(opacity[i], alpha, in.settings.encoding) : opacity[i];
-        matter[2 * i] = entry.extinction * in.step_world;
-        const bool next = i + 1 < size && in.entries.entry[i + 1].opaque;
-        matter[2 * i + 1] = entry.opaque ? EntryLookup::entry_is + (next ? EntryLookup::segment_is : 0) : 0;
+        const double depth = entry.extinction * in.step_world;
+        opacity[i] = -depth, matter[2 * i] = depth;
+        matter[2 * i + 1] = entry.opaque ? static_cast<int>(EntryLookup::entry_is) : 0;
+        if (entry.opaque && opaque) matter[2 * i - 1] += static_cast<int>(EntryLookup::segment_is);
+        opaque = entry.opaque;
+        lookup.has_opaque = lookup.has_opaque || opaque;
     }
+    portable::expm1_each(opacity, opacity);
+    for (double& alpha : opacity) alpha = -alpha;
+    for (std::size_t i = 0; i < size; ++i) {
+        const Vec3& c = in.entries.entry[i].color;
+        double* const row = seen.data() + 4 * i;
+        row[0] = c.x, row[1] = c.y, row[2] = c.z, row[EntryLookup::alpha] = opacity[i];
+    }
+    for (std::size_t i = 0; rooted && i < size; ++i)
+        seen[4 * i + EntryLookup::alpha] = decoded_alpha(opacity[i], alpha, in.settings.encoding);
     lookup.table.fill(seen, std::array{color, color, color, stored});
     for (int i = 0; rooted && i < n; ++i)
         lookup.table.set_exact(i, EntryLookup::alpha, opacity[static_cast<std::size_t>(i)], stored.format);
@@ -127,7 +133,7 @@ EntryLookup build_entry_lookup(const ClassificationInputs& in) {
     lookup.to_alpha = Rescale(stored.format.fraction_bits + in.input_fraction, slab_alpha,
                               static_cast<int>(Wire::slab_alpha));
     lookup.least_opaque = lookup.to_alpha.wraps ? slab_alpha.format.smallest() : slab_alpha.format.largest();
-    for (int i = 0; i < n; ++i)
+    for (int i = 0; lookup.has_opaque && i < n; ++i)
         if (in.entries.entry[static_cast<std::size_t>(i)].opaque)
             lookup.least_opaque =
                 std::min(lookup.least_opaque,

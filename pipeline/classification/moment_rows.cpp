@@ -1,7 +1,5 @@
 #include "pipeline/classification/moment_rows.h"
 
-#include <type_traits>
-
 #ifndef HWY_DISABLED_TARGETS  // vectors of SVE have no size: see pi2d_kernel.cpp
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
 #endif
@@ -22,13 +20,13 @@ using V = hn::Vec<Tag>;
 constexpr Tag kTag;
 constexpr int kLanes = static_cast<int>(HWY_LANES(double));
 
-/// One lane for every column, kVectors vectors a row.  A lane's sum grows by its entry's depth or light times
+/// One lane for every column, a few vectors a row.  A lane's sum grows by its entry's depth or light times
 /// the mean of t^k over the entry, k being the lane's moment.
-template <int kVectors>
+template <int kOrder>
 void write_rows(const MomentSteps& steps, int first, int end, double unit, int word_fraction,
                 std::int32_t* HWY_RESTRICT words) {
     const hn::Rebind<std::int32_t, Tag> half;
-    const int columns = 1 + 3 * steps.order;
+    constexpr int columns = 1 + 3 * kOrder, kVectors = (columns + kLanes - 1) / kLanes;
     const V one = hn::Set(kTag, 1), round = hn::Set(kTag, 0x1.8p52), in_block = hn::Set(kTag, unit);
     const V scale = hn::Set(kTag, static_cast<double>(std::int64_t{1} << word_fraction)),
             largest = hn::Set(kTag, static_cast<double>((std::int64_t{2} << word_fraction) - 1));
@@ -57,10 +55,11 @@ void write_rows(const MomentSteps& steps, int first, int end, double unit, int w
         V mean[kVectors];
         for (int v = 0; v < kVectors; ++v) mean[v] = one;
         V of_power = one, power = one;
-        for (int k = 1; k < steps.order; ++k) {
+        for (int k = 1; k < kOrder; ++k) {
             const V order = hn::Set(kTag, static_cast<double>(k));
-            power = hn::Mul(power, depth);
-            of_power = hn::Add(hn::Mul(hn::Mul(order, next), of_power), power);
+            power = k == 1 ? depth : hn::Mul(power, depth);
+            of_power =
+                k == 1 ? hn::Add(next, depth) : hn::Add(hn::Mul(hn::Mul(order, next), of_power), power);
             of_power = k == 1 ? hn::Mul(of_power, hn::Set(kTag, 0.5))
                               : hn::Div(of_power, hn::Set(kTag, static_cast<double>(k + 1)));
             for (int v = 0; v < kVectors; ++v)
@@ -77,27 +76,15 @@ void write_rows(const MomentSteps& steps, int first, int end, double unit, int w
 
 void WriteMomentRows(const MomentSteps& steps, int first, int end, double unit, int word_fraction,
                      std::int32_t* words) {
-    const int vectors = (3 * steps.order + kLanes) / kLanes;  // that 1 + 3 order columns take
-    const auto write = [&](auto count) {
-        write_rows<decltype(count)::value>(steps, first, end, unit, word_fraction, words);
-    };
-    switch (vectors) {
-        case 1:
-            return write(std::integral_constant<int, 1>());
+    switch (steps.order) {
         case 2:
-            return write(std::integral_constant<int, 2>());
+            return write_rows<2>(steps, first, end, unit, word_fraction, words);
         case 3:
-            return write(std::integral_constant<int, 3>());
+            return write_rows<3>(steps, first, end, unit, word_fraction, words);
         case 4:
-            return write(std::integral_constant<int, 4>());
-        case 5:
-            return write(std::integral_constant<int, 5>());
-        case 6:
-            return write(std::integral_constant<int, 6>());
-        case 7:
-            return write(std::integral_constant<int, 7>());
+            return write_rows<4>(steps, first, end, unit, word_fraction, words);
         default:
-            return write(std::integral_constant<int, 8>());
+            return write_rows<5>(steps, first, end, unit, word_fraction, words);
     }
 }
 

@@ -12,7 +12,7 @@ namespace squint {
 /// light again for every further moment; `padded` numbers an entry.
 struct MomentSteps {
     static constexpr int kPadded = 16;  // 1 + 3 * 5, the most orders
-    int order = 2, count = 0;
+    int order = 2;
     int padded = kPadded;
     std::vector<double> number;
 

@@ -27,6 +27,7 @@ struct Step {
 };
 std::vector<Step> steps_of(const Entries& entries) {
     std::vector<Step> steps;
+    steps.reserve(entries.entry.size());
     for (std::size_t i = 0; i + 1 < entries.entry.size(); ++i) {
         const Entry &a = entries.entry[i], &b = entries.entry[i + 1];
         const double t0 = a.extinction, t1 = b.extinction;
@@ -103,8 +104,7 @@ class BlockUnits {
 
 /// Steps as vectors take them.
 MomentSteps side_by_side(const std::vector<Step>& steps, int order) {
-    MomentSteps result{
-        order, static_cast<int>(steps.size()), 1 + 3 * order <= 8 ? 8 : MomentSteps::kPadded, {}};
+    MomentSteps result{order, 1 + 3 * order <= 8 ? 8 : MomentSteps::kPadded, {}};
     result.number.resize(steps.size() * static_cast<std::size_t>(result.padded));
     double* to = result.number.data();
     for (const Step& step : steps) {
@@ -160,8 +160,8 @@ void fill_moments(MomentSeries& m, const Entries& fine, const Spec& spec, bool k
                 std::int32_t* const first = words.get() + row * static_cast<std::size_t>(columns);
                 write_moment_rows(many, start, end, unit, spec.format.fraction_bits, first);
                 std::int32_t* const last = first + (end - start) * columns;
-                for (int i = columns; i < (start + length - end + 1) * columns; ++i)
-                    last[i] = last[i - columns];
+                for (int i = end; i < start + length; ++i)
+                    std::copy_n(last, columns, last + (i + 1 - end) * columns);
             } else {
                 fill_block(m, steps, static_cast<int>(row), start, length, unit, spec);
             }

@@ -1,9 +1,12 @@
 #include "pipeline/classification/pips.h"
 
-#include "pipeline/preintegration/prefix_tables.h"
+#include "pipeline/classification/light_sums.h"
+#include "pipeline/preintegration/linear_entries.h"
 
 #include <array>
 #include <cmath>
+#include <memory>
+#include <span>
 
 namespace squint {
 
@@ -17,17 +20,11 @@ PowerSeriesOfOrder1 build_power_series_of_order_1(const ClassificationInputs& in
     if (bits) between = preintegration::subdivided(in.entries, 1 << bits);
     const std::vector<Entry>& entry = bits ? between.entry : in.entries.entry;
     const double step = std::ldexp(in.step_world, -bits);
-    std::vector<double> sums(entry.size() * 3);
-    Vec3 sum{0, 0, 0};
-    for (std::size_t i = 0; i + 1 < entry.size(); ++i)
-        for (int c = 0; c < 3; ++c) {
-            sum[c] += preintegration::colored_depth(entry[i].color[c], entry[i].extinction,
-                                                    entry[i + 1].color[c], entry[i + 1].extinction);
-            sums[3 * (i + 1) + static_cast<std::size_t>(c)] = sum[c] * step;
-        }
+    const std::unique_ptr<double[]> sums = std::make_unique_for_overwrite<double[]>(3 * entry.size() + 1);
+    write_light_sums(entry, step, sums.get());
     m.moment = Table(static_cast<int>(entry.size()), 3, in.keeps_exact);
     m.moment.wire = static_cast<int>(Wire::table_moment);
-    m.moment.fill(sums, std::array{moment, moment, moment});
+    m.moment.fill(std::span(sums.get(), 3 * entry.size()), std::array{moment, moment, moment});
     m.to_ratio = Rescale(moment.format.fraction_bits - in.specs[Wire::table_extinction].format.fraction_bits,
                          ratio, static_cast<int>(Wire::slab_ratio));
     m.to_ratio.divides = true;
@@ -40,14 +37,7 @@ PowerSeriesOfOrder1 build_power_series_of_order_1(const ClassificationInputs& in
         return m;
     }
     std::vector<std::int32_t> rows(static_cast<std::size_t>(4 * n));
-    std::int32_t most_rise = 0;
-    for (int i = 0; i < n; ++i) {
-        std::int32_t* row = rows.data() + 4 * i;
-        row[0] = depth[stride * i];
-        for (int c = 0; c < 3; ++c) row[1 + c] = colored[3 * i + c];
-        for (int c = 0; i > 0 && c < 4; ++c) most_rise = std::max(most_rise, row[c] - row[c - 4]);
-    }
-    m.most_rise = most_rise;
+    m.most_rise = join_rows(depth, stride, colored, n, rows.data());
     m.rows = std::make_shared<const std::vector<std::int32_t>>(std::move(rows));
     return m;
 }

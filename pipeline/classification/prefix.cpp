@@ -1,5 +1,6 @@
 #include "pipeline/classification/prefix.h"
 
+#include "pipeline/classification/light_sums.h"
 #include "pipeline/preintegration/linear_entries.h"
 #include "pipeline/preintegration/opaque_prediction.h"
 
@@ -19,11 +20,12 @@ constexpr double kStraightEnough = 1.0 / 255;
 
 int sub_entry_bits_for_color(const ClassificationInputs& in, int most_rows) {
     double worst = kInsideEntry;  // and no less: one row is enough for that
+    if (largest_swing(in.entries.entry) * 2 / 3 <= worst) return 0;
     for (int i = 0; i + 1 < in.entries.size(); ++i) {
         const Entry &a = in.entries.entry[static_cast<std::size_t>(i)],
                     &b = in.entries.entry[static_cast<std::size_t>(i) + 1];
-        const Vec3 step = b.color - a.color;
-        const double swing = std::max({std::abs(step.x), std::abs(step.y), std::abs(step.z)});
+        const double swing = std::max({std::abs(b.color.x - a.color.x), std::abs(b.color.y - a.color.y),
+                                       std::abs(b.color.z - a.color.z)});
         // The mean weighted by extinction is at most two thirds of the swing away from either end.
         const double depth = std::max(a.extinction, b.extinction) * in.step_world;
         if (swing * 2 / 3 * std::min(depth, 1.0) > worst)  // more than the opacity can make of it
@@ -47,19 +49,24 @@ PrefixLookup build_prefix_lookup(const ClassificationInputs& in, int sub_entry_b
     const double step = std::ldexp(in.step_world, -sub_entry_bits);
     const int rows = fine.size();
     p.sub_entry_bits = sub_entry_bits;
-    double bend = 0;
-    for (int i = 0; i + 1 < rows; ++i)
-        bend = std::max(bend, std::abs(fine.entry[static_cast<std::size_t>(i) + 1].extinction -
-                                       fine.entry[static_cast<std::size_t>(i)].extinction));
+    const auto extinction_of = [&](int i) { return fine.entry[static_cast<std::size_t>(i)].extinction; };
+    std::vector<double> depths(static_cast<std::size_t>(rows));
+    double bend = 0, sum = 0;  // trapezoids: exact for a linear extinction
+    for (int i = 0; i + 1 < rows; ++i) {
+        const double a = extinction_of(i), b = extinction_of(i + 1);
+        bend = std::max(bend, std::abs(b - a));
+        sum += 0.5 * (a + b);
+        depths[static_cast<std::size_t>(i) + 1] = sum * step;
+    }
     p.curved = bend * in.step_world > kStraightEnough && p.place_bits() > 0;
     const std::size_t columns = p.curved ? 2 : 1;
-    std::vector<double> depths(static_cast<std::size_t>(rows) * columns);
-    double sum = 0;  // trapezoids: exact for a linear extinction
-    for (std::size_t i = 0; i + 1 < static_cast<std::size_t>(rows); ++i) {
-        const double a = fine.entry[i].extinction, b = fine.entry[i + 1].extinction;
-        if (p.curved) depths[i * columns + 1] = (b - a) * step;
-        sum += 0.5 * (a + b);
-        depths[(i + 1) * columns] = sum * step;
+    if (p.curved) {
+        depths.resize(2 * depths.size());
+        for (int i = rows - 1; i >= 0; --i) {
+            double* const row = depths.data() + 2 * i;
+            row[0] = depths[static_cast<std::size_t>(i)];
+            row[1] = i + 1 < rows ? (extinction_of(i + 1) - extinction_of(i)) * step : 0;
+        }
     }
     require_range(in.specs, Wire::table_extinction, sum * step,
                   "the prefix sums of the entries' optical depths");
