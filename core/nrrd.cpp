@@ -110,7 +110,17 @@ std::string data_path(const std::string& path, const std::string& name) {
         throw InputError(fmt::format(
             "{}: data file is \"{}\", but only files in the header's own folder or below are allowed", path,
             printable(name)));
-    return (std::filesystem::path(path).parent_path() / data).string();
+    const std::filesystem::path folder = std::filesystem::path(path).parent_path(), file = folder / data;
+    std::error_code error;
+    const auto really = [&](const std::filesystem::path& p) { return std::filesystem::canonical(p, error); };
+    const std::filesystem::path home = really(folder.empty() ? "." : folder), there = really(file);
+    if (!error && std::mismatch(home.begin(), home.end(), there.begin(), there.end()).first != home.end())
+        throw InputError(
+            fmt::format("{}: data file is \"{}\", a link to elsewhere, but only files in the header's own "
+                        "folder or below "
+                        "are allowed",
+                        path, printable(name)));
+    return file.string();  // where there is none, opening it says so
 }
 
 // --- teem

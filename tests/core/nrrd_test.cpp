@@ -356,6 +356,34 @@ TEST_F(Nrrd, RefusesHeadersThatPointElsewhere) {
     EXPECT_THAT(with("."), HasSubstr("not a regular file"));
 }
 
+TEST_F(Nrrd, RefusesLinksThatLeadOutOfTheHeadersFolder) {
+    namespace fs = std::filesystem;
+    file("voxels.raw", k24Bytes);
+    fs::create_directories(folder / "sub/deeper");
+    file("sub/deeper/own.raw", k24Bytes);
+    fs::create_symlink("../voxels.raw", folder / "sub/out.raw");
+    fs::create_directory_symlink("..", folder / "sub/up");
+    fs::create_symlink("deeper/own.raw", folder / "sub/in.raw");
+    fs::create_symlink("nowhere.raw", folder / "sub/broken.raw");
+    const auto with = [&](const std::string& name) {
+        return refusal_of(file("sub/a.nhdr", Header{.more = "data file: " + name + "\n"}.text()));
+    };
+    for (const std::string name : {"out.raw", "up/voxels.raw", "./deeper/.././up/voxels.raw"})
+        EXPECT_THAT(with(name), HasSubstr("only files in the header's own folder or below are allowed"));
+    EXPECT_EQ(with("out.raw"),
+              "sub/a.nhdr: data file is \"out.raw\", a link to elsewhere, but only files in the header's own "
+              "folder or below are allowed");
+    EXPECT_EQ(with("in.raw"), "no refusal");
+    EXPECT_EQ(with("up/sub/in.raw"), "no refusal");  // and back again
+    EXPECT_THAT(with("broken.raw"), HasSubstr("sub/broken.raw: cannot read: No such file or directory"));
+    // A folder that is itself reached through a link is the header's own.
+    fs::create_directory_symlink("sub", folder / "link");
+    EXPECT_EQ(refusal_of((folder / "link/a.nhdr").string()),
+              "link/broken.raw: cannot read: No such file or directory");
+    file("sub/a.nhdr", Header{.more = "data file: in.raw\n"}.text());
+    EXPECT_EQ(refusal_of((folder / "link/a.nhdr").string()), "no refusal");
+}
+
 TEST_F(Nrrd, RefusesSpacingsThatCannotBe) {
     const auto with = [&](const std::string& more) {
         return refusal_of(file("a.nrrd", Header{.more = more + "\n"}.text() + k24Bytes));
