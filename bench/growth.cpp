@@ -1,11 +1,12 @@
 // How time and memory grow with the picture, the volume, the step and the threads: the procedural phantom,
 // PC, unlit.
 //
-//     bench_growth --benchmark_out=growth.json        (SQUINT_BENCH_LARGE=1 adds 1024^3: some GB and minutes)
+//     bench_growth --benchmark_out=growth.json        (SQUINT_BENCH_LARGE=1 adds 1024^3: 2 GiB of voxels)
 //
-// The time is the ray cast alone.  Counters: `ns_per_sample` over all samples of all rays, `peak_mib` of
-// resident memory while plan and picture were made (the volume included), `setup_ms` of what is built once
-// for a volume, `load`. bench/tables.py growth prints the slopes.
+// The time is the ray cast alone, of frames behind the first.  Counters: `ns_per_sample` over all samples of
+// all rays, `ns_per_visited` over those that were not left out as empty, `peak_mib` of resident memory while
+// plan and first picture were made (the volume included), `setup_ms` of what is built once for a volume,
+// `load`. bench/growth.py prints tables and slopes and draws them.
 #include "bench/support/support.h"
 #include "core/error.h"
 
@@ -44,15 +45,18 @@ void time_point(benchmark::State& state, const Point& point) {
     Rendering last = render(plan, options);
     const double setup_ms = 1000 * last.statistics.setup_seconds;
     const double peak_mib = static_cast<double>(peak_memory()) / (1 << 20);
-    double seconds = 0, samples = 0;
+    double seconds = 0, samples = 0, visited = 0;
     for (auto step : state) {
         (void)step;
         last = render(plan, options);
         state.SetIterationTime(last.statistics.seconds);
         seconds += last.statistics.seconds, samples += static_cast<double>(last.statistics.samples);
+        visited += static_cast<double>(last.statistics.visited);
     }
     state.counters["at"] = point.at;
     state.counters["ns_per_sample"] = 1e9 * seconds / samples;
+    state.counters["ns_per_visited"] = 1e9 * seconds / visited;
+    state.SetLabel(last.statistics.layout.substr(0, last.statistics.layout.find(':')));
     state.counters["setup_ms"] = setup_ms;
     state.counters["peak_mib"] = peak_mib;
     state.counters["load"] = load();

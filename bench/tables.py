@@ -3,11 +3,9 @@
 
     bench/tables.py vtk vtk.jsonl > docs/measurements/vtk.md
     bench/tables.py equal-error equal_error.jsonl
-    bench/tables.py growth growth.json        (Google Benchmark's)
     bench/tables.py frame frame.json          (Google Benchmark's)
 """
 import json
-import math
 import statistics
 import sys
 
@@ -132,29 +130,10 @@ def medians(result):
     for run in result["benchmarks"]:
         if run.get("run_type") == "iteration" and not run.get("error_occurred"):
             runs.setdefault(run["name"].replace("/process_time/manual_time", ""), []).append(run)
-    keys = ("real_time", "cpu_time", "at", "ns_per_sample", "psnr", "peak_mib", "setup_ms", "whole_ms", "load")
+    keys = ("real_time", "cpu_time", "at", "ns_per_sample", "ns_per_visited", "psnr", "peak_mib", "setup_ms",
+            "whole_ms", "load")
     return {name: {k: statistics.median(r[k] for r in list_) for k in keys if k in list_[0]}
-            for name, list_ in runs.items()}
-
-
-def slope(points):
-    """Of log y over log x, by least squares."""
-    x, y = [math.log(p[0]) for p in points], [math.log(p[1]) for p in points]
-    mx, my = statistics.mean(x), statistics.mean(y)
-    return sum((a - mx) * (b - my) for a, b in zip(x, y)) / sum((a - mx) ** 2 for a in x)
-
-
-def growth(result):
-    axes = {}
-    for name, run in medians(result).items():
-        axes.setdefault(name.split("/")[1], []).append(run)
-    for axis, runs in axes.items():
-        print(f"## {axis}\n")
-        print(table([axis, "ms", "processor ms", "ns per sample", "set-up ms", "peak MiB", "load"],
-                    [[f"{r['at']:g}", milliseconds(r["real_time"]), milliseconds(r["cpu_time"]), f"{r['ns_per_sample']:.2f}",
-                      milliseconds(r["setup_ms"]), f"{r['peak_mib']:.0f}", f"{r['load']:.1f}"] for r in runs]))
-        if len(runs) > 1:
-            print(f"time grows with {axis} to the power {slope([(r['at'], r['real_time']) for r in runs]):.2f}\n")
+            | {"label": list_[0].get("label", "")} for name, list_ in runs.items()}
 
 
 def frame(result):
@@ -167,7 +146,7 @@ def frame(result):
 
 
 if __name__ == "__main__":
-    kinds = {"vtk": vtk, "equal-error": equal_error, "growth": growth, "frame": frame}
+    kinds = {"vtk": vtk, "equal-error": equal_error, "frame": frame}
     if len(sys.argv) != 3 or sys.argv[1] not in kinds:
         sys.exit(__doc__)
     kinds[sys.argv[1]](read(sys.argv[2]))
