@@ -63,7 +63,7 @@ void BuildWords(benchmark::State& state) {
         const ClassificationMethod built = build_method({entries, specs, settings, 1, fraction, false});
         benchmark::DoNotOptimize(&built);
     }
-    state.SetLabel(fmt::format("{} {}", name_of(method), settings.order));
+    state.SetLabel(fmt::format("{} {}", name_of(method), settings.order_or_least()));
 }
 void every_method_and_size(benchmark::internal::Benchmark* b) {
     for (const int size : {256, 4096}) {

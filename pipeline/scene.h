@@ -103,11 +103,14 @@ struct ShadingSettings {
 
 struct ClassificationSettings {
     Method method = Method::pc;
-    int order = 1;         // n of pips and leg
-    int table_size = 256;  // of pi2d, a side
+    std::optional<int> order;  // n of pips and leg
+    int table_size = 256;      // of pi2d, a side
     TableLookup lookup = TableLookup::bilinear;
     AlphaEncoding encoding = AlphaEncoding::alpha;
     bool opaque_prediction = true;  // for experiments only: without it thin opaque surfaces are lost
+
+    /// The least that the method has, where none is given.
+    int order_or_least() const { return order.value_or(method == Method::leg ? 2 : 1); }
 };
 
 struct CompositingSettings {
@@ -210,7 +213,8 @@ void visit_scene(S& scene, V&& visit) {
     auto& classification = scene.classification;
     visit("classification.method", classification.method,
           "pc, pc_mid, pi2d, pi2d_no_attenuation, pi1d, pi1d_engel, pips or leg");
-    visit("classification.order", classification.order, "n of pips (1 to 5) and leg (2 to 4)");
+    visit("classification.order", classification.order,
+          "n of pips (1 to 5; default 1) and leg (2 to 4; default 2)");
     visit("classification.table_size", classification.table_size, "entries a side of pi2d, 64 to 4096");
     visit("classification.lookup", classification.lookup, "pi2d: bilinear or nearest");
     visit("classification.encoding", classification.encoding,

@@ -20,7 +20,7 @@ ClassificationMethod build_method(const ClassificationInputs& inputs) {
         case Method::pi2d_no_attenuation:
             return build_pre_integrated_2d(inputs);
         case Method::pips:
-            if (inputs.settings.order == 1) return build_power_series_of_order_1(inputs);
+            if (inputs.settings.order_or_least() == 1) return build_power_series_of_order_1(inputs);
             return build_moment_series(inputs);
         case Method::leg:
             return build_moment_series(inputs);

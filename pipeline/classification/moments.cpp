@@ -232,9 +232,10 @@ void fill_weights(MomentSeries& m, bool legendre, double deepest) {
 }
 
 void check_order(const ClassificationSettings& settings, int first, int last) {
-    if (settings.order < first || settings.order > last)
+    const int order = settings.order_or_least();
+    if (order < first || order > last)
         throw InputError(fmt::format("classification.order: {} is not an order of {}, which has {} to {}",
-                                     settings.order, name_of(settings.method), first, last));
+                                     order, name_of(settings.method), first, last));
 }
 
 }  // namespace
@@ -253,7 +254,7 @@ MomentSeries build_moment_series(const ClassificationInputs& in) {
     check_order(in.settings, 2, legendre ? preintegration::kMostLegendre : preintegration::kMostMoments);
     MomentSeries m;
     m.prefix = build_prefix_lookup(in);
-    m.order = in.settings.order;
+    m.order = in.settings.order_or_least();
     m.splits = legendre;
     const Spec moment = in.specs[Wire::table_moment], ratio = in.specs[Wire::slab_ratio],
                depth = in.specs[Wire::slab_depth], alpha = in.specs[Wire::slab_alpha];

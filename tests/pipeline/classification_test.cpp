@@ -7,6 +7,8 @@
 #include "pipeline/preintegration/pi1d.h"
 #include "pipeline/preintegration/pi2d.h"
 #include "pipeline/preintegration/pips.h"
+#include "pipeline/record.h"
+#include "pipeline/render.h"
 #include "preintegration_cases.h"
 
 #include <gtest/gtest.h>
@@ -209,6 +211,21 @@ TEST(ClassificationMethods, TablesHaveTheSameWordsWithAndWithoutTheirExactValues
                 std::visit([&](auto& method) { method.visit(CollectWords{many}); }, plain);
                 ASSERT_EQ(many, one_by_one) << preset << ' ' << function.name << ' ' << m.name();
             }
+}
+
+TEST(ClassificationMethods, AnOrderThatIsNotGivenIsTheLeastOfItsMethod) {
+    const auto hash_of = [](const std::string& method, const std::string& order) {
+        const Scene scene = scene_with(built_in_scene(),
+                                       {"volume.dims=12", "image.width=16", "image.height=16",
+                                        "classification.method=" + method, "classification.order=" + order});
+        const auto volume = std::make_shared<const Volume>(load_volume(volume_source(scene)));
+        return picture_hash(render(make_plan(scene, volume)).image);
+    };
+    EXPECT_EQ(hash_of("leg", "auto"), hash_of("leg", "2"));
+    EXPECT_NE(hash_of("leg", "auto"), hash_of("leg", "3"));
+    EXPECT_EQ(hash_of("pips", "auto"), hash_of("pips", "1"));
+    EXPECT_NE(hash_of("pips", "auto"), hash_of("pips", "3"));
+    EXPECT_THROW(hash_of("leg", "1"), InputError);
 }
 
 TEST(PreIntegrated2D, CellsOfSixteenBitsTakeEightBytes) {

@@ -160,7 +160,7 @@ TEST(SceneFile, RefusesNumbersOutOfRange) {
              {"transfer_function.entries=65537", "a whole number from 2 to 65536, or 0"},
              {"shading.ka=1.5", "a number from 0 to 1"},
              {"shading.exponent=5000", "a number from 1 to 4096"},
-             {"classification.order=6", "a whole number from 1 to 5"},
+             {"classification.order=6", "a whole number from 1 to 5, or \"auto\""},
              {"classification.table_size=63", "a whole number from 64 to 4096"},
              {"camera.turntable=0", "a whole number from 1 to 10000"},
              {"camera.fov_y=180", "a number above 0 and below 180"},
