@@ -133,7 +133,7 @@ void add_render(CLI::App& app, RenderArguments& a) {
         "--no-skip", [&](std::int64_t) { a.options.skip = false; }, "Visit empty space too");
     verb.add_option_function<std::string>(
             "--max-memory", [&](const std::string& text) { a.max_memory = size_of(text, "--max-memory"); },
-            "Refuse a scene that needs more, as in 2G")
+            "Refuse a scene that needs more, as in 2G; mapped files do not count, layouts take what is left")
         ->type_name("SIZE");
     verb.add_flag("-q,--quiet", a.quiet, "No progress, no summary");
     verb.add_flag("--scene-reference", a.scene_reference,

@@ -174,8 +174,10 @@ int run(const PlanArguments& a) {
     text += "\nstages (bits with sign)\n" + stages_text(plan);
     text += plan.real ? "\nevery wire is a double: nothing is rounded\n" : "\nwires\n" + wires_text(plan);
     text += "\ntables\n" + tables_text(plan);
-    text += fmt::format("\nmemory: volume {}, tables {}, picture {}\n", text_of_bytes(memory.volume),
-                        text_of_bytes(memory.tables), text_of_bytes(memory.image));
+    text += fmt::format("\nmemory: volume {}{}, tables {}, picture {}\n",
+                        text_of_bytes(memory.volume + memory.mapped),
+                        memory.mapped > 0 ? " (mapped from its file)" : "", text_of_bytes(memory.tables),
+                        text_of_bytes(memory.image));
     text += plan.real ? "model: double\n" : fmt::format("model: {}-bit integers\n", plan.word_bits);
     text += plan.skips_empty_space
                 ? "empty space: skipped where it can be\n"

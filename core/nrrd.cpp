@@ -434,6 +434,14 @@ void take_mapped(StoredVolume& stored, const MappedFile& file, std::size_t offse
                                      offset ? fmt::format(" after the first {}", offset) : "", needs(stored),
                                      there > stored.size() ? ": oversized" : ""));
     stored.bytes = std::shared_ptr<const unsigned char>(file.bytes, file.bytes.get() + offset);
+    // Whole voxels of each hole.
+    const std::size_t width = bytes_of(stored.type);
+    for (const ByteRun& hole : file.holes) {
+        const std::size_t first = (std::max(hole.first, offset) - offset + width - 1) / width,
+                          end = (std::max(hole.end, offset) - offset) / width;
+        if (first < end)
+            stored.zeros.push_back({static_cast<std::int64_t>(first), static_cast<std::int64_t>(end)});
+    }
 }
 
 StoredVolume read_nrrd(const std::string& path, const MappedFile& file, const LoadLimits& limits,

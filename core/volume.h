@@ -8,10 +8,16 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace squint {
 
 enum class ScalarType : std::uint8_t { u8, u16 };  // how scalars lie in memory
+
+/// Voxels [first, end), counted as they lie in memory.
+struct VoxelRun {
+    std::int64_t first = 0, end = 0;
+};
 
 /// Scalars are levels: stored value minus the smallest the type or a declared window allows (CONVENTIONS.md, "Scalars").
 /// A volume is immutable and cheap to copy; its voxels are shared, in memory or mapped from a file.
@@ -21,6 +27,8 @@ struct Volume {
     Vec3 origin{0, 0, 0};           // world position of the first voxel's centre
     ScalarType type = ScalarType::u8;
     std::shared_ptr<const void> data;  // dims.x * dims.y * dims.z scalars of `type`, little-endian; 64 more bytes can be read
+    bool mapped = false;            // they lie in a mapped file, which the system reads and forgets as it likes
+    std::vector<VoxelRun> zeros;    // known to be 0 unread: what a sparse file never wrote; in order, apart
     std::uint32_t smallest = 0;     // least and greatest scalar in the data
     std::uint32_t largest = 0;
     int scalar_bits = 8;            // I: integer bits that hold every scalar of the declared range
@@ -37,6 +45,12 @@ struct Volume {
         const std::int64_t index = (z * dims.y + y) * dims.x + x;
         return type == ScalarType::u8 ? static_cast<const std::uint8_t*>(data.get())[index]
                                       : static_cast<const std::uint16_t*>(data.get())[index];
+    }
+    /// Whether voxels [first, end) are known to be 0 without a look at them.
+    bool known_zero(std::int64_t first, std::int64_t end) const {
+        const auto after = std::upper_bound(zeros.begin(), zeros.end(), first,
+                                            [](std::int64_t voxel, const VoxelRun& run) { return voxel < run.first; });
+        return after != zeros.begin() && end <= (after - 1)->end;
     }
     double smallest_spacing() const { return std::min(spacing.x, std::min(spacing.y, spacing.z)); }
 

@@ -33,7 +33,7 @@ constexpr std::size_t kHugePage = std::size_t{1} << 21;
 constexpr std::size_t kPieceBytes = std::size_t{1} << 22;
 
 struct Piece {
-    std::uint32_t smallest, largest;
+    std::uint32_t smallest = 0, largest = 0;
     std::string hash;
 };
 
@@ -59,6 +59,23 @@ Piece measure_piece(const Scalar* scalars, std::size_t count) {
     hasher.bytes(scalars, count * sizeof(Scalar));
     return {*std::min_element(least, least + kLanes), *std::max_element(greatest, greatest + kLanes),
             hasher.hex()};
+}
+
+/// Where a file has no data.  None where the file is not sparse or its system cannot say.
+std::vector<ByteRun> holes_of(int file, const struct stat& status) {
+    constexpr std::int64_t kSector = 512;        // the unit of st_blocks
+    constexpr std::size_t kMostHoles = 1 << 16;  // a file of many more is read like any other from there on
+    std::vector<ByteRun> holes;
+    if (status.st_blocks * kSector >= status.st_size) return holes;
+    for (off_t at = 0; at < status.st_size && holes.size() < kMostHoles;) {
+        const off_t hole = lseek(file, at, SEEK_HOLE);
+        if (hole < 0 || hole >= status.st_size) break;
+        const off_t data = lseek(file, hole, SEEK_DATA);
+        if (data < 0 && errno != ENXIO) break;  // ENXIO: none behind it
+        at = data < 0 ? status.st_size : data;
+        holes.push_back({static_cast<std::size_t>(hole), static_cast<std::size_t>(at)});
+    }
+    return holes;
 }
 
 }  // namespace
@@ -94,7 +111,7 @@ MappedFile map_file(const std::string& path) {
                                                [memory, reserved](const void*) { munmap(memory, reserved); });
     if (size > 0 && mmap(memory, size, PROT_READ, MAP_SHARED | MAP_FIXED, file, 0) == MAP_FAILED)
         refuse(path, errno);
-    return {std::move(bytes), size};
+    return {std::move(bytes), size, holes_of(file, status)};
 }
 
 std::string text_of(const Index3& dims) {
@@ -130,13 +147,23 @@ int bits_for(std::uint64_t largest) {
 void measure(Volume& volume) {
     const std::size_t bytes = static_cast<std::size_t>(volume.voxels()) * volume.scalar_bytes();
     const auto* data = static_cast<const unsigned char*>(volume.data.get());
+    const auto measured = [&](const unsigned char* piece, std::size_t size) {
+        return volume.type == ScalarType::u8
+                   ? measure_piece(reinterpret_cast<const std::uint8_t*>(piece), size)
+                   : measure_piece(reinterpret_cast<const std::uint16_t*>(piece), size / 2);
+    };
+    Piece nothing;  // a whole piece of zeros
+    if (!volume.zeros.empty()) {
+        const std::vector<std::uint16_t> zeros(kPieceBytes / 2);
+        nothing = measured(reinterpret_cast<const unsigned char*>(zeros.data()), kPieceBytes);
+    }
     std::vector<Piece> pieces((bytes + kPieceBytes - 1) / kPieceBytes);
     tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t i) {
-        const unsigned char* piece = data + i * kPieceBytes;
-        const std::size_t size = std::min(kPieceBytes, bytes - i * kPieceBytes);
-        pieces[i] = volume.type == ScalarType::u8
-                        ? measure_piece(reinterpret_cast<const std::uint8_t*>(piece), size)
-                        : measure_piece(reinterpret_cast<const std::uint16_t*>(piece), size / 2);
+        const std::size_t from = i * kPieceBytes, size = std::min(kPieceBytes, bytes - from);
+        const auto first = static_cast<std::int64_t>(from / volume.scalar_bytes()),
+                   end = static_cast<std::int64_t>((from + size) / volume.scalar_bytes());
+        pieces[i] =
+            size == kPieceBytes && volume.known_zero(first, end) ? nothing : measured(data + from, size);
     });
     Hasher hasher;
     for (const std::int64_t size : {volume.dims.x, volume.dims.y, volume.dims.z})

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace squint {
 
@@ -18,10 +19,16 @@ inline constexpr std::size_t kPaddingBytes = 64;
 /// no memory.
 std::shared_ptr<void> allocate_voxels(std::size_t bytes, const std::string& where);
 
+/// Bytes [first, end) of a file.
+struct ByteRun {
+    std::size_t first = 0, end = 0;
+};
+
 /// A whole file, read-only, with kPaddingBytes readable after it.
 struct MappedFile {
     std::shared_ptr<const unsigned char> bytes;
     std::size_t size = 0;
+    std::vector<ByteRun> holes;  // of a sparse file: zeros that lie on no disk; in order
 };
 /// Throws InputError: no such file, not a regular file.  A file that shrinks while mapped ends the process
 /// (SIGBUS).
@@ -40,7 +47,7 @@ std::string text_of(const Index3& dims);
 /// Bits that hold `largest`, at least 1.
 int bits_for(std::uint64_t largest);
 
-/// Sets smallest, largest and content_hash from dims, type and data.
+/// Sets smallest, largest and content_hash from dims, type and data.  What is known to be zero is not read.
 void measure(Volume& volume);
 
 }  // namespace squint

@@ -259,6 +259,8 @@ void shift_integers(Volume& volume, const StoredVolume& stored, const Values& va
     if (stored.type != StoredType::i16 && !values.windowed && !stored.reordered() && !swapped && aligned) {
         volume.data = stored.inflated ? std::shared_ptr<const void>(stored.inflated)
                                       : std::shared_ptr<const void>(stored.bytes);
+        volume.mapped = !stored.inflated;
+        if (volume.mapped) volume.zeros = stored.zeros;
         return;
     }
     std::atomic<std::int64_t> outside{0};

@@ -26,6 +26,7 @@ struct StoredVolume {
     int scalar_bits = 0;                              // declared in the file, or 0
 
     std::shared_ptr<const unsigned char> bytes;  // mapped from the file, or
+    std::vector<VoxelRun> zeros;                 // of those: voxels whose bytes are zeros on no disk, or
     std::shared_ptr<unsigned char> inflated;     // in memory of our own, which may be changed in place
 
     std::size_t voxels() const { return static_cast<std::size_t>(dims.x * dims.y * dims.z); }

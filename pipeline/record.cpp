@@ -88,7 +88,9 @@ std::int64_t table_bytes(const Plan& plan) {
 
 Memory memory_of(const Plan& plan, const RenderStatistics& statistics) {
     const Volume& v = *plan.volume;
-    return {.volume = v.voxels() * static_cast<std::int64_t>(v.scalar_bytes()),
+    const std::int64_t voxel_bytes = v.voxels() * static_cast<std::int64_t>(v.scalar_bytes());
+    return {.volume = v.mapped ? 0 : voxel_bytes,
+            .mapped = v.mapped ? voxel_bytes : 0,
             .tables = table_bytes(plan),
             .image = image_bytes(plan.scene),
             .buffers = statistics.bytes};
@@ -162,11 +164,8 @@ Json json_of(const Errors& errors) {
 }
 
 Json json_of(const Memory& m) {
-    return {{"volume_bytes", m.volume},
-            {"table_bytes", m.tables},
-            {"image_bytes", m.image},
-            {"buffer_bytes", m.buffers},
-            {"total_bytes", m.total()}};
+    return {{"volume_bytes", m.volume}, {"mapped_bytes", m.mapped},  {"table_bytes", m.tables},
+            {"image_bytes", m.image},   {"buffer_bytes", m.buffers}, {"total_bytes", m.total()}};
 }
 
 Json json_of(const Volume& v) {

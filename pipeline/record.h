@@ -26,9 +26,9 @@ Attributes exr_attributes(const Plan& plan, int frame = 0);
 /// Of size, channel names and every bit of every channel.
 std::string picture_hash(const Image& image);
 
-/// Bytes held for a picture.
+/// Bytes held for a picture.  A mapped file's voxels are not in the total: they stand on the disk.
 struct Memory {
-    std::int64_t volume = 0, tables = 0, image = 0, buffers = 0;
+    std::int64_t volume = 0, mapped = 0, tables = 0, image = 0, buffers = 0;
     std::int64_t total() const { return volume + tables + image + buffers; }
 };
 std::int64_t image_bytes(const Scene& scene);  // of every channel the scene asks for

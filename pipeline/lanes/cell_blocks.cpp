@@ -37,19 +37,24 @@ std::int64_t CellBlocks::bytes_of_all(const Volume& volume) {
     return n.x * n.y * n.z * kCells * cell_bytes_of(volume);
 }
 
+std::int64_t CellBlocks::table_bytes_of(const Volume& volume) {
+    const Index3 n = blocks_of(volume);
+    return n.x * n.y * n.z * static_cast<std::int64_t>(sizeof(std::int32_t));
+}
+
 CellBlocks::CellBlocks(const Volume& volume, std::int64_t most_bytes)
     : volume_(borrowed(volume)), blocks_(blocks_of(volume)) {
     block_bytes_ = std::int64_t{kCells} * cell_bytes_of(volume);
     const std::int64_t all = blocks_.x * blocks_.y * blocks_.z;
     // Cells are counted in 32 bits.
     room_ = std::min({all, most_bytes / block_bytes_, std::int64_t{0x7fffffff} / kCells});
-    slots_.assign(static_cast<std::size_t>(all), kNotBuilt);
     if (room_ <= 0) return;
+    slots_.assign(static_cast<std::size_t>(all), kNotBuilt);
     const auto bytes = static_cast<std::size_t>(room_ * block_bytes_);
     void* place =
         mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
     if (place == MAP_FAILED) {
-        room_ = 0;
+        room_ = 0, slots_.clear();
         return;
     }
     madvise(place, bytes, MADV_HUGEPAGE);
@@ -113,13 +118,15 @@ void CellBlocks::fill(std::int64_t index, T* cells) const {
         }
 }
 
-std::shared_ptr<CellBlocks> cell_blocks(const Volume& volume, std::int64_t most_bytes) {
+std::shared_ptr<CellBlocks> cell_blocks(const Volume& volume, std::int64_t most_bytes, bool strictly) {
     static KeptPerVolume<CellBlocks> kept;
     const std::int64_t block = std::int64_t{CellBlocks::kCells} * cell_bytes_of(volume);
     const std::int64_t wanted = std::min(most_bytes, CellBlocks::bytes_of_all(volume)) / block * block;
     return kept.find(
         volume, [&] { return std::make_shared<CellBlocks>(volume, wanted); },
-        [&](const CellBlocks& cells) { return cells.room() == wanted; });
+        [&](const CellBlocks& cells) {
+            return cells.room() == wanted || (!strictly && cells.room() >= wanted / 2);
+        });
 }
 
 }  // namespace squint::lanes

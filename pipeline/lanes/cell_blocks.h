@@ -25,6 +25,8 @@ class CellBlocks {
 
     /// Bytes of a whole volume's cells.
     static std::int64_t bytes_of_all(const Volume& volume);
+    /// Bytes of the table of where blocks lie.
+    static std::int64_t table_bytes_of(const Volume& volume);
 
     /// Builds the blocks for which wanted(block) and that are not there yet, while there is room.
     void build(const std::function<bool(std::int64_t)>& wanted);
@@ -51,7 +53,8 @@ class CellBlocks {
     std::int64_t taken_ = 0;  // blocks
 };
 
-/// The cells of a volume, kept while its voxels live.  A later call may ask for more room.
-std::shared_ptr<CellBlocks> cell_blocks(const Volume& volume, std::int64_t most_bytes);
+/// The cells of a volume, kept while its voxels live.  A later call may ask for another room: `strictly` for
+/// no more than this one, otherwise for about as much.
+std::shared_ptr<CellBlocks> cell_blocks(const Volume& volume, std::int64_t most_bytes, bool strictly);
 
 }  // namespace squint::lanes

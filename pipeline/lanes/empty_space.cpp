@@ -12,28 +12,38 @@
 namespace squint::lanes {
 namespace {
 
+// Ranges of the blocks along x that lie at y, z of the box.
 template <class T>
-void measure_slab(const Volume& volume, BlockRanges& ranges, std::int64_t bz) {
+void measure_row(const Volume& volume, BlockRanges& ranges, std::int64_t y, std::int64_t z) {
     const T* data = static_cast<const T*>(volume.data.get());
-    const Index3 n = volume.dims;
-    // The voxels of a row, folded onto its blocks; a block's last voxel is its neighbour's first.
-    const auto z0 = bz * kBlock, z1 = std::min(z0 + kBlock, n.z - 1);
-    for (std::int64_t by = 0; by < ranges.blocks.y; ++by) {
-        const auto y0 = by * kBlock, y1 = std::min(y0 + kBlock, n.y - 1);
-        for (std::int64_t z = z0; z <= z1; ++z)
-            for (std::int64_t y = y0; y <= y1; ++y) {
-                const T* row = data + (z * n.y + y) * n.x;
-                for (std::int64_t bx = 0; bx < ranges.blocks.x; ++bx) {
-                    const auto x0 = bx * kBlock, x1 = std::min(x0 + kBlock, n.x - 1);
-                    T low = row[x0], high = row[x0];
-                    for (std::int64_t x = x0 + 1; x <= x1; ++x)
-                        low = std::min(low, row[x]), high = std::max(high, row[x]);
-                    const auto at = static_cast<std::size_t>(ranges.index(bx, by, bz));
-                    ranges.smallest[at] = std::min<std::uint16_t>(ranges.smallest[at], low);
-                    ranges.largest[at] = std::max<std::uint16_t>(ranges.largest[at], high);
-                }
+    const Index3 n = volume.dims, &low = ranges.box.low, &blocks = ranges.box.blocks;
+    std::uint16_t* smallest = ranges.smallest.data() + (z * blocks.y + y) * blocks.x;
+    std::uint16_t* largest = ranges.largest.data() + (z * blocks.y + y) * blocks.x;
+    // The voxels of each line, folded onto its blocks; a block's last voxel is its neighbour's first.
+    const auto first = [](std::int64_t block) { return block * kBlock; };
+    const auto last = [](std::int64_t block, std::int64_t voxels) {
+        return std::min((block + 1) * kBlock, voxels - 1);
+    };
+    const std::int64_t from = first(low.x), end = last(low.x + blocks.x - 1, n.x) + 1;
+    bool zeros = false;  // of lines that are known to be zero
+    for (std::int64_t k = first(low.z + z); k <= last(low.z + z, n.z); ++k)
+        for (std::int64_t j = first(low.y + y); j <= last(low.y + y, n.y); ++j) {
+            const std::int64_t line = (k * n.y + j) * n.x;
+            if (volume.known_zero(line + from, line + end)) {
+                zeros = true;
+                continue;
             }
-    }
+            const T* row = data + line;
+            for (std::int64_t x = 0; x < blocks.x; ++x) {
+                const auto x0 = first(low.x + x), x1 = last(low.x + x, n.x);
+                T least = row[x0], greatest = row[x0];
+                for (std::int64_t i = x0 + 1; i <= x1; ++i)
+                    least = std::min(least, row[i]), greatest = std::max(greatest, row[i]);
+                smallest[x] = std::min<std::uint16_t>(smallest[x], least);
+                largest[x] = std::max<std::uint16_t>(largest[x], greatest);
+            }
+        }
+    if (zeros) std::fill_n(smallest, blocks.x, std::uint16_t{0});
 }
 
 // Chebyshev distance to the nearest zero: one more than the nearest of a block's 26 neighbours has, 13 of
@@ -76,7 +86,7 @@ void spread(std::vector<std::uint8_t>& distance, const Index3& blocks) {
 
 // Each block's range with its 26 neighbours': axis by axis.
 void widen(BlockRanges& ranges) {
-    const Index3 n = ranges.blocks;
+    const Index3 n = ranges.box.blocks;
     const auto pass = [&](std::int64_t stride, std::int64_t count) {
         const BlockRanges old = ranges;
         tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
@@ -98,28 +108,40 @@ void widen(BlockRanges& ranges) {
 }  // namespace
 
 namespace {
-std::shared_ptr<BlockRanges> measure(const Volume& volume) {
+std::shared_ptr<BlockRanges> measure(const Volume& volume, const BlockBox& box) {
     auto ranges = std::make_shared<BlockRanges>();
-    const auto cells = [](std::int64_t n) {
-        return std::max<std::int64_t>((n - 1 + kBlock - 1) / kBlock, 1);
-    };
-    ranges->blocks = Index3(cells(volume.dims.x), cells(volume.dims.y), cells(volume.dims.z));
-    const auto count = static_cast<std::size_t>(ranges->blocks.x * ranges->blocks.y * ranges->blocks.z);
+    ranges->box = box;
+    const auto count = static_cast<std::size_t>(box.count());
     ranges->smallest.assign(count, 0xffff), ranges->largest.assign(count, 0);
-    tbb::parallel_for(std::int64_t{0}, ranges->blocks.z, [&](std::int64_t bz) {
-        if (volume.type == ScalarType::u8)
-            measure_slab<std::uint8_t>(volume, *ranges, bz);
-        else
-            measure_slab<std::uint16_t>(volume, *ranges, bz);
+    tbb::parallel_for(std::int64_t{0}, box.blocks.z, [&](std::int64_t z) {
+        for (std::int64_t y = 0; y < box.blocks.y; ++y)
+            if (volume.type == ScalarType::u8)
+                measure_row<std::uint8_t>(volume, *ranges, y, z);
+            else
+                measure_row<std::uint16_t>(volume, *ranges, y, z);
     });
     return ranges;
 }
 }  // namespace
 
-std::shared_ptr<const BlockRanges> block_ranges(const Volume& volume) {
+bool BlockBox::holds(const BlockBox& other) const {
+    for (int a = 0; a < 3; ++a)
+        if (other.low[a] < low[a] || other.low[a] + other.blocks[a] > low[a] + blocks[a]) return false;
+    return true;
+}
+
+BlockBox all_blocks_of(const Volume& volume) {
+    const auto cells = [](std::int64_t n) {
+        return std::max<std::int64_t>((n - 1 + kBlock - 1) / kBlock, 1);
+    };
+    return {Index3(0), Index3(cells(volume.dims.x), cells(volume.dims.y), cells(volume.dims.z))};
+}
+
+std::shared_ptr<const BlockRanges> block_ranges(const Volume& volume, const BlockBox& box) {
     static KeptPerVolume<BlockRanges> kept;
     return kept.find(
-        volume, [&] { return measure(volume); }, [](const BlockRanges&) { return true; });
+        volume, [&] { return measure(volume, box); },
+        [&](const BlockRanges& ranges) { return ranges.box.holds(box); });
 }
 
 EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, int reach, int entry_reach) {
@@ -148,7 +170,8 @@ EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, i
     for (int i = 0; i < reach; ++i) widen(widened);
     const BlockRanges& seen = reach > 0 ? widened : ranges;
     EmptySpace space;
-    const Index3 n = space.blocks = ranges.blocks;
+    space.box = ranges.box;
+    const Index3 n = space.box.blocks;
     space.distance.reserve(ranges.smallest.size() + 3);  // lanes read four bytes at any of them
     space.distance.assign(ranges.smallest.size(), 255);
     std::atomic<std::int64_t> visible{0};

@@ -14,24 +14,33 @@ namespace squint::lanes {
 inline constexpr int kBlockBits = 2;  // blocks of 4 x 4 x 4 cells
 inline constexpr int kBlock = 1 << kBlockBits;
 
+/// Blocks from `low`, so many along each axis.
+struct BlockBox {
+    Index3 low{0, 0, 0}, blocks{0, 0, 0};
+    std::int64_t count() const { return blocks.x * blocks.y * blocks.z; }
+    bool holds(const BlockBox& other) const;
+};
+BlockBox all_blocks_of(const Volume& volume);
+
 /// Least and greatest scalar any sample inside a block's cells can take.  Kept per volume.
 struct BlockRanges {
-    Index3 blocks{0, 0, 0};
+    BlockBox box;
     std::vector<std::uint16_t> smallest, largest;  // x fastest
-    std::int64_t index(std::int64_t x, std::int64_t y, std::int64_t z) const {
-        return (z * blocks.y + y) * blocks.x + x;
-    }
 };
-std::shared_ptr<const BlockRanges> block_ranges(const Volume& volume);
+/// Of these blocks at least.  Of a volume larger than memory, only what is rendered need be read.
+std::shared_ptr<const BlockRanges> block_ranges(const Volume& volume, const BlockBox& box);
 
 /// Chebyshev distance in blocks to the nearest block in which anything can be seen; 0 there, at most 255.
 struct EmptySpace {
-    Index3 blocks{0, 0, 0};
+    BlockBox box;  // no ray leaves it
     std::vector<std::uint8_t> distance;
     std::int64_t visible_blocks = 0;
     std::uint8_t at(std::int64_t x, std::int64_t y, std::int64_t z) const {
-        return distance[static_cast<std::size_t>((z * blocks.y + y) * blocks.x + x)];
+        const Index3 &low = box.low, &n = box.blocks;
+        return distance[static_cast<std::size_t>(((z - low.z) * n.y + y - low.y) * n.x + x - low.x)];
     }
+    /// Bytes of the ranges and distances of these blocks.
+    static std::int64_t bytes_for(const BlockBox& box) { return 5 * box.count(); }
 };
 
 /// `reach`: blocks that two neighbouring samples may lie apart, where the method sees the range between them;

@@ -70,7 +70,7 @@ void set_course(const Plan& plan, const lanes::EmptySpace& empty, const lanes::R
     const LocationStage& stage = plan.location;
     const auto cell_unit = hn::Set(df, float_power(-stage.location_fraction)),
                step_unit = hn::Set(df, float_power(-stage.direction_fraction));
-    const Index3 &n = plan.volume->dims, &blocks = empty.blocks;
+    const Index3 &n = plan.volume->dims, &low = empty.box.low, &blocks = empty.box.blocks;
     // A location is rounded once, by a last bit at most; floats add their own error.
     course.margin = float_power(-stage.location_fraction) +
                     static_cast<float>(std::max({n.x, n.y, n.z})) * 0x1p-20F + 0x1p-10F;
@@ -86,8 +86,10 @@ void set_course(const Plan& plan, const lanes::EmptySpace& empty, const lanes::R
             const auto pace =
                 hn::Div(hn::Set(df, 1.0F), hn::Abs(hn::IfThenElse(still, hn::Set(df, 1.0F), step)));
             hn::Store(hn::IfThenElse(still, hn::Set(df, 1e30F), pace), df, course.pace[a].v + r);
-            const auto here = hn::Min(shift_right_same(hn::Load(d, rays.last[a].v + r), to_block),
-                                      hn::Set(d, static_cast<Word>(blocks[a] - 1)));
+            const auto of_all = shift_right_same(hn::Load(d, rays.last[a].v + r), to_block);
+            const auto here =
+                hn::Min(hn::Max(hn::Sub(of_all, hn::Set(d, static_cast<Word>(low[a]))), hn::Zero(d)),
+                        hn::Set(d, static_cast<Word>(blocks[a] - 1)));
             block = hn::Add(hn::Mul(block, hn::Set(d, static_cast<Word>(blocks[a]))), here);
         }
         // The ray's last sample stands at its exit, off P0 + kV by what rounding V adds up to.

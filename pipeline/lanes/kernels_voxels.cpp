@@ -291,16 +291,18 @@ auto empty_ahead(const lanes::EmptySpace& empty, const lanes::RayCourse& course,
     const auto zero = hn::Zero(d), one = hn::Set(d, 1);
     const auto margin = hn::Set(df, course.margin), side = hn::Set(df, float(lanes::kBlock)),
                inner_side = hn::Sub(side, margin);
-    const std::int64_t counts[3] = {empty.blocks.x, empty.blocks.y, empty.blocks.z};
-    const Word strides[3] = {1, static_cast<Word>(empty.blocks.x),
-                             static_cast<Word>(empty.blocks.x * empty.blocks.y)};
+    const Index3 &low_block = empty.box.low, &counts = empty.box.blocks;
+    const Word strides[3] = {1, static_cast<Word>(counts.x), static_cast<Word>(counts.x * counts.y)};
     const auto number = hn::ConvertTo(df, at);
     hn::Vec<decltype(df)> p[3], low_side[3];  // where the ray is, and the lower face of its block there
     auto index = zero;
     auto beside = hn::Gt(zero, zero);  // a sample may lie in the next block
     for (int a = 0; a < 3; ++a) {
         p[a] = hn::MulAdd(number, hn::Load(df, course.step[a].v + r), hn::Load(df, course.first[a].v + r));
-        p[a] = hn::Min(hn::Max(p[a], hn::Zero(df)), hn::Set(df, float(dims[a] - 1)));
+        // From here on, in voxels from the lowest block.
+        const std::int64_t first = low_block[a] * lanes::kBlock;
+        p[a] = hn::Sub(p[a], hn::Set(df, float(first)));
+        p[a] = hn::Min(hn::Max(p[a], hn::Zero(df)), hn::Set(df, float(dims[a] - 1 - first)));
         const auto last = hn::Set(d, static_cast<Word>(counts[a] - 1));
         const auto block = hn::Min(hn::ShiftRight<lanes::kBlockBits>(hn::ConvertTo(d, p[a])), last);
         low_side[a] = hn::Mul(hn::ConvertTo(df, block), side);

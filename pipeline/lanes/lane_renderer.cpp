@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <fstream>
 #include <limits>
 
 namespace squint::lanes {
@@ -43,33 +44,61 @@ KnownRescales known_of(Stage... stage) {
     return all.known;
 }
 
+// How far samples may leave the box that is rendered, in voxels: what rounding V adds up to.
+double drift_of(const Plan& plan) {
+    return std::ldexp(static_cast<double>(-plan.location.low[0]), -plan.location.common_fraction);
+}
+
 // Blocks that a slab's two ends may lie apart; 0 where one sample classifies it.
 int slab_reach(const Plan& plan) {
     if (!plan.needs_back) return 0;
-    // Its far end may be off by what rounding V adds up to.
-    const double drift =
-        std::ldexp(static_cast<double>(-plan.location.low[0]), -plan.location.common_fraction);
-    return static_cast<int>(std::ceil(std::min((plan.scene.sampling.step + drift) / kBlock, 1e6)));
+    return static_cast<int>(std::ceil(std::min((plan.scene.sampling.step + drift_of(plan)) / kBlock, 1e6)));
 }
 
-// Whether rays that leave out empty space may meet a block of cells: they still run through what lies within
-// a batch of something visible.
-bool may_be_met(const EmptySpace& empty, const Index3& cell_blocks, std::int64_t block) {
+// Blocks that samples may lie in, and as many about them as a slab reaches, and one more.
+BlockBox blocks_met(const Plan& plan) {
+    const Volume& volume = *plan.volume;
+    const BlockBox all = all_blocks_of(volume);
+    const Vec3 low = volume.voxel_from_world(plan.box_low), high = volume.voxel_from_world(plan.box_high);
+    const double beyond = kBlock * (slab_reach(plan) + 1) + drift_of(plan) + 1;
+    BlockBox box;
+    for (int a = 0; a < 3; ++a) {
+        const auto block = [&](double voxel) {
+            const double inside = std::clamp(voxel, 0.0, static_cast<double>(volume.dims[a] - 1));
+            return std::min(static_cast<std::int64_t>(inside) >> kBlockBits, all.blocks[a] - 1);
+        };
+        box.low[a] = block(low[a] - beyond);
+        box.blocks[a] = std::max(block(high[a] + beyond), box.low[a]) - box.low[a] + 1;
+    }
+    return box;
+}
+
+// Whether rays may meet a block of cells.  Those that leave out empty space still run through what lies
+// within a batch of something visible.
+bool may_be_met(const BlockBox& box, const EmptySpace* empty, const Index3& cell_blocks, std::int64_t block) {
     constexpr int kBits = CellBlocks::kBits - kBlockBits;
     static_assert(kBits >= 0);
-    const Index3 low(block % cell_blocks.x << kBits, block / cell_blocks.x % cell_blocks.y << kBits,
-                     block / (cell_blocks.x * cell_blocks.y) << kBits);
-    const auto end = [&](std::int64_t from, std::int64_t count) {
-        return std::min(from + (1 << kBits), count);
-    };
-    for (auto z = low.z; z < end(low.z, empty.blocks.z); ++z)
-        for (auto y = low.y; y < end(low.y, empty.blocks.y); ++y)
-            for (auto x = low.x; x < end(low.x, empty.blocks.x); ++x)
-                if (empty.at(x, y, z) <= kSteps >> kBlockBits) return true;
+    const Index3 at(block % cell_blocks.x, block / cell_blocks.x % cell_blocks.y,
+                    block / (cell_blocks.x * cell_blocks.y));
+    Index3 low, end;
+    for (int a = 0; a < 3; ++a) {
+        low[a] = std::max(at[a] << kBits, box.low[a]);
+        end[a] = std::min((at[a] + 1) << kBits, box.low[a] + box.blocks[a]);
+        if (low[a] >= end[a]) return false;
+    }
+    if (!empty) return true;
+    for (auto z = low.z; z < end.z; ++z)
+        for (auto y = low.y; y < end.y; ++y)
+            for (auto x = low.x; x < end.x; ++x)
+                if (empty->at(x, y, z) <= kSteps >> kBlockBits) return true;
     return false;
 }
 
+// What the system could give: pages of mapped files make way.
 std::int64_t free_memory() {
+    std::ifstream file("/proc/meminfo");
+    for (std::string word; file >> word;)
+        if (std::int64_t kib = 0; word == "MemAvailable:" && file >> kib) return kib << 10;
     return std::int64_t{sysconf(_SC_AVPHYS_PAGES)} * sysconf(_SC_PAGESIZE);
 }
 
@@ -127,12 +156,23 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
 
 LaneRenderer::LaneRenderer(const Plan& plan, const RenderOptions& options)
     : plan_(plan), target_(find_target(options.target)), ways_(ways_of(plan)) {
-    constexpr int kMostReach = 4;  // with longer slabs little is left out
-    if (options.skip && plan.skips_empty_space && slab_reach(plan) <= kMostReach)
-        empty_ =
-            find_empty_space(*block_ranges(*plan.volume), plan.entries, slab_reach(plan), plan.entry_reach);
+    room_ = options.layout_bytes >= 0 ? options.layout_bytes : free_memory() / 2;
+    if (options.skip && plan.skips_empty_space) find_empty();
     choose_layout(options);
     kernels_ = kernels_for(plan, ways_, voxels_, target_);
+}
+
+void LaneRenderer::find_empty() {
+    constexpr int kMostReach = 4;  // with longer slabs little is left out
+    if (slab_reach(plan_) > kMostReach) return;
+    const BlockBox box = blocks_met(plan_);
+    if (EmptySpace::bytes_for(box) > room_) {
+        no_room_to_skip_ = true;
+        return;
+    }
+    empty_ = find_empty_space(*block_ranges(*plan_.volume, box), plan_.entries, slab_reach(plan_),
+                              plan_.entry_reach);
+    room_ -= EmptySpace::bytes_for(empty_->box);
 }
 
 void LaneRenderer::choose_layout(const RenderOptions& options) {
@@ -153,12 +193,15 @@ void LaneRenderer::choose_layout(const RenderOptions& options) {
             return;
         }
     }
-    const std::int64_t room = options.layout_bytes >= 0 ? options.layout_bytes : free_memory() / 2;
-    cells_ = cell_blocks(volume, room);
-    cells_->build(
-        [&](std::int64_t block) { return !empty_ || may_be_met(*empty_, cells_->blocks(), block); });
-    if (cells_->room() > 0)
+    const std::int64_t room = std::max<std::int64_t>(room_ - CellBlocks::table_bytes_of(volume), 0);
+    cells_ = cell_blocks(volume, room, options.layout_bytes >= 0);
+    if (cells_->room() > 0) {
+        const BlockBox box = blocks_met(plan_);
+        cells_->build([&](std::int64_t block) {
+            return may_be_met(box, empty_ ? &*empty_ : nullptr, cells_->blocks(), block);
+        });
         voxels_.cells = cells_->data(), voxels_.blocks = cells_->blocks(), voxels_.slots = cells_->slots();
+    }
     layout_ = fmt::format("cells: 2x2x2 voxels side by side, {:.1f} MiB if all were met, room for {:.1f} MiB",
                           static_cast<double>(all) / 0x1p20, static_cast<double>(cells_->room()) / 0x1p20);
 }
@@ -170,12 +213,12 @@ std::string LaneRenderer::why() const {
     if (plan_.lit) text += fmt::format(", gradients {}, shading {}", ways_.gradient.bits, ways_.shading.bits);
     if (empty_)
         text += fmt::format("; {} of {} blocks visible", empty_->visible_blocks, empty_->distance.size());
+    if (no_room_to_skip_) text += "; empty space is visited, for there is no room for its blocks";
     return text;
 }
 
 std::int64_t LaneRenderer::bytes() const {
-    return (empty_ ? static_cast<std::int64_t>(5 * empty_->distance.size()) : 0) +
-           (cells_ ? cells_->bytes() : 0);
+    return (empty_ ? EmptySpace::bytes_for(empty_->box) : 0) + (cells_ ? cells_->bytes() : 0);
 }
 
 namespace {

@@ -34,6 +34,7 @@ class LaneRenderer {
     std::string layout() const { return layout_; }
 
   private:
+    void find_empty();
     void choose_layout(const RenderOptions& options);
 
     const Plan& plan_;
@@ -42,6 +43,8 @@ class LaneRenderer {
     StageKernels kernels_;
     std::optional<EmptySpace> empty_;
     std::shared_ptr<CellBlocks> cells_;
+    bool no_room_to_skip_ = false;
+    std::int64_t room_ = 0;  // bytes for what stands beside the volume
     VoxelSource voxels_;
     std::string layout_;
 };

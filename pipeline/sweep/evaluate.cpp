@@ -222,7 +222,7 @@ std::shared_ptr<const Volume> Evaluator::volume_of(const Scene& scene) {
     Loaded& loaded = found->second;
     if (is_new) try {
             loaded.volume = std::make_shared<const Volume>(load_volume(volume_source(scene)));
-            lanes::block_ranges(*loaded.volume);  // now, not while points run beside each other
+            lanes::block_ranges(*loaded.volume, lanes::all_blocks_of(*loaded.volume));  // now, not while points run beside each other
         } catch (const InputError& error) {
             loaded.failure = error.what();
         }

@@ -233,6 +233,31 @@ TEST_F(Render, RefusesMoreMemoryThanAllowed) {
     EXPECT_EQ(squint("render" + kSmall + "--max-memory 10M").code, 0);
 }
 
+TEST_F(Render, AMappedVolumeLargerThanTheMemoryAllowedIsRendered) {
+    ASSERT_EQ(shell("yes squint | head -c 16777216 > v.raw").code, 0);  // 256^3
+    const std::string render =
+        "render --size 24x16 --json - -q --set volume.file=v.raw --set volume.dims=[256,256,256] --set "
+        "volume.type=u8 "
+        "--set transfer_function.unit_distance=50 --set "
+        "'transfer_function.points=[[99, 1, 1, 1, 0], [120, 1, 0.5, 1, 0.9]]' ";
+    const auto whole = squint(render).json()["pictures"][0];
+    for (const std::string layout : {"linear", "cells"}) {
+        const Outcome outcome = squint(render + "--max-memory 8M --layout " + layout);
+        ASSERT_EQ(outcome.code, 0) << outcome.err;
+        const auto picture = outcome.json()["pictures"][0];
+        EXPECT_EQ(picture["hash"], whole["hash"]);
+        EXPECT_EQ(picture["memory"]["mapped_bytes"], 1 << 24);
+        EXPECT_EQ(picture["memory"]["volume_bytes"], 0);
+        EXPECT_LE(picture["memory"]["total_bytes"], 8 << 20);
+        EXPECT_GT(picture["memory"]["total_bytes"], layout == "cells" ? 4 << 20 : 0)
+            << "cells take what there is";
+    }
+    // Big-endian voxels must be put in order, in memory.
+    const std::string swapped =
+        " --set volume.dims=[128,256,256] --set volume.type=u16 --set volume.endian=big ";
+    expect_refusal(squint(render + swapped + "--max-memory 8M"), "needs 16777216 bytes of memory");
+}
+
 TEST_F(Render, AFullDiskLeavesNothing) {
     if (geteuid() != 0) GTEST_SKIP() << "needs root, to mount a small disk";
     const fs::path disk = folder / "disk";
