@@ -1,8 +1,5 @@
 #include "core/curve_kernel.h"
 
-#ifndef HWY_DISABLED_TARGETS  // vectors of SVE have no size: see pi2d_kernel.cpp
-#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
-#endif
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/curve_kernel.cpp"
 #include <hwy/foreach_target.h>

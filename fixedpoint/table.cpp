@@ -4,9 +4,6 @@
 #include <algorithm>
 #include <limits>
 
-#ifndef HWY_DISABLED_TARGETS  // vectors of SVE have no size: see pi2d_kernel.cpp
-#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
-#endif
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "fixedpoint/table.cpp"
 #include <hwy/foreach_target.h>

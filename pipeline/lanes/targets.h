@@ -1,8 +1,5 @@
 // Which SIMD targets are compiled: AVX-512, AVX2, SSE4, NEON and plain C++ (EMU128, "scalar"), and how one is
 // called by name. Included before Highway in every file of kernels.
-#ifndef HWY_DISABLED_TARGETS
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
-#endif
 #ifndef HWY_COMPILE_ALL_ATTAINABLE
 #define HWY_COMPILE_ALL_ATTAINABLE
 #endif

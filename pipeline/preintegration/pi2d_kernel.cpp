@@ -4,9 +4,6 @@
 #include <cmath>
 #include <cstdint>
 
-#ifndef HWY_DISABLED_TARGETS  // vectors of SVE have no size, and no structure can have them as members
-#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
-#endif
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "pipeline/preintegration/pi2d_kernel.cpp"
 #include <hwy/foreach_target.h>
