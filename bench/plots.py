@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Time per frame against error, one SVG a scene, from bench_equal_error's lines.
 
-    build/release/bench/bench_equal_error scenes=figure_5,cthead_translucent,figure_7,figure_8,head size=256 every=4 \
+    build/release/bench/bench_equal_error scenes=figure_5,cthead_translucent,figure_7,figure_8,head size=128 every=2 \
         all=1 finest=0.25 > out/plots.jsonl
     bench/plots.py out/plots.jsonl docs/images > docs/measurements/time-error.md       # and docs/images/time_error_SCENE.svg
 
