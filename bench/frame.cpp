@@ -4,8 +4,9 @@
 //
 // The time is the ray cast alone.  Counters: `whole_ms` with plan and tables, `ns_per_sample` over all
 // samples of all rays (those in empty space too: compare with skipping off), `psnr` of the foreground against
-// the same picture without rounding, in dB (200: equal), and the machine's `load`.  Before anything is timed,
-// lanes and model must give the same bits.
+// the same picture in double, in dB (200: equal), and the machine's `load`.  Before anything is timed, lanes
+// and model must give the same bits.  `/float32` and `/default` are the same frame in float32 words and in
+// fixed-point ones.
 #include "bench/support/support.h"
 #include "core/error.h"
 #include "pipeline/record.h"
@@ -50,6 +51,7 @@ struct Frame {
     RenderOptions options{};
     Picture picture = Picture::same;
     int size = 800;
+    std::string preset = "default";
 
     std::string name() const {
         return fmt::format("frame/{}/{}/step_{}/{}/{}/threads_{}",
@@ -61,6 +63,7 @@ struct Frame {
         overrides.push_back(fmt::format("sampling.step={}", step));
         overrides.push_back(fmt::format("image.width={}", size));
         overrides.push_back(fmt::format("image.height={}", size));
+        overrides.push_back("precision.preset=" + preset);
         return std::isdigit(scene[0]) ? phantom_scene(std::stoll(scene), lit, overrides)
                                       : data_scene(scene, lit, overrides);
     }
@@ -90,8 +93,8 @@ const std::vector<std::string>& targets() {
 
 double psnr_of(const Frame& frame, const Plan& plan, const Image& picture) {
     static std::map<std::string, double> known;  // bits do not depend on the way
-    const std::string key =
-        fmt::format("{} {} {} {} {}", frame.scene, frame.lit, frame.step, frame.method.name, frame.size);
+    const std::string key = fmt::format("{} {} {} {} {} {}", frame.scene, frame.lit, frame.step,
+                                        frame.method.name, frame.size, frame.preset);
     constexpr int kEvery = 8;
     const auto found = known.find(key);
     if (found != known.end()) return found->second;
@@ -129,27 +132,29 @@ void time_frame(benchmark::State& state, const Frame& frame) try {
 
 /// Lanes of every target and the model give the same picture.  Throws InputError.
 void check_bits() {
-    for (const char* method : {"pc", "pi2d", "pi1d", "pips"})
-        for (const bool lit : {false, true}) {
-            const Frame frame{
-                .scene = "24",
-                .lit = lit,
-                .method = {method,
-                           {fmt::format("classification.method={}", method), "classification.table_size=64"}},
-                .size = 32};
-            const Scene scene = frame.read();
-            const Plan plan = make_plan(scene, volume_of(scene));
-            const auto picture = [&](Path path, const std::string& target) {
-                RenderOptions options = with(1, target);
-                options.path = path;
-                return picture_hash(render(plan, options).image);
-            };
-            const std::string model = picture(Path::model, "");
-            for (const std::string& target : targets())
-                if (picture(Path::automatic, target) != model)
-                    throw InputError(fmt::format("{} {}, {}: lanes and model differ", method,
-                                                 lit ? "lit" : "unlit", target));
-        }
+    for (const char* preset : {"default", "float32"})
+        for (const char* method : {"pc", "pi2d", "pi1d", "pips"})
+            for (const bool lit : {false, true}) {
+                const Frame frame{.scene = "24",
+                                  .lit = lit,
+                                  .method = {method,
+                                             {fmt::format("classification.method={}", method),
+                                              "classification.table_size=64"}},
+                                  .size = 32,
+                                  .preset = preset};
+                const Scene scene = frame.read();
+                const Plan plan = make_plan(scene, volume_of(scene));
+                const auto picture = [&](Path path, const std::string& target) {
+                    RenderOptions options = with(1, target);
+                    options.path = path;
+                    return picture_hash(render(plan, options).image);
+                };
+                const std::string model = picture(Path::model, "");
+                for (const std::string& target : targets())
+                    if (picture(Path::automatic, target) != model)
+                        throw InputError(fmt::format("{} {} {}, {}: lanes and model differ", preset, method,
+                                                     lit ? "lit" : "unlit", target));
+            }
 }
 
 std::vector<Frame> frames_of(const std::string& scene) {
@@ -162,6 +167,12 @@ std::vector<Frame> frames_of(const std::string& scene) {
             frames.push_back(frame);
             frame.way = "no_skipping", frame.options = with(1, "", false);
             frames.push_back(frame);
+            // Fixed against float32 on the same layout: these two beside the two above.
+            frame.preset = "float32", frame.way = "float32_no_skipping";
+            frames.push_back(frame);
+            frame.way = "float32", frame.options = with(1);
+            frames.push_back(frame);
+            frame.preset = plain.preset;
             frame.way = "new_transfer_function", frame.options = with(1);
             frame.picture = Picture::new_transfer_function;
             frames.push_back(frame);

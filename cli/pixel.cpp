@@ -29,7 +29,8 @@ std::string heading(const Plan& plan, const PixelArguments& a, const RayTrace& t
                         plan.step_world);
     text += fmt::format("first sample at voxel {:.6f} {:.6f} {:.6f}, V = {:.6f} {:.6f} {:.6f}\n", s.first.x,
                         s.first.y, s.first.z, s.step.x, s.step.y, s.step.z);
-    if (plan.real) text += "precision is real; shown are the words of preset wide\n";
+    if (plan.real)
+        text += fmt::format("precision is {}; shown are the words of preset wide\n", plan.real_name());
     return text + "\n";
 }
 

@@ -1,5 +1,6 @@
 // squint plan: what a scene exercises, and what was left out and why.
 #include "cli/common.h"
+#include "pipeline/lanes/lane_renderer.h"
 #include "pipeline/record.h"
 
 #include <fmt/format.h>
@@ -70,11 +71,24 @@ const StageReport& stage_of(const Plan& plan, std::string_view name) {
     return plan.stages.front();
 }
 
+std::string in_words(const Plan& plan) {
+    return plan.float32 ? "in float32" : "in double";
+}
+
+/// How it will be rendered, and why: as `squint render` reports it.
+struct PathOf {
+    std::string path, why;
+};
+PathOf path_of(const Plan& plan) {
+    if (const auto obstacle = lanes::what_needs_the_model(plan)) return {"model", *obstacle};
+    return {"lanes", lanes::words_in_lanes(plan)};
+}
+
 std::string stages_text(const Plan& plan) {
     Rows rows{{"stage", "", "widest operand", "widest result", "word", ""}};
     for (const StageReport& s : plan.stages) {
         if (s.modelled && plan.real)
-            rows.push_back({s.name, "in double", "-", "-", "-", s.why});
+            rows.push_back({s.name, in_words(plan), "-", "-", "-", s.why});
         else if (s.modelled)
             rows.push_back({s.name, "modelled", std::to_string(s.needs.operand_bits),
                             std::to_string(s.needs.result_bits), std::to_string(word_of(s.needs.result_bits)),
@@ -122,7 +136,7 @@ std::string brief_text(const Plan& plan) {
                                      to_string(plan.specs.spec[w].format));
         text += fmt::format("  {:<16} {}\n", stage.name,
                             !stage.modelled ? "left out: " + stage.why
-                            : plan.real     ? "in double"
+                            : plan.real     ? in_words(plan)
                                             : wires);
     }
     return text;
@@ -148,6 +162,8 @@ Json json_of_plan(const Plan& plan) {
             {"scene", json_of_scene(plan.scene)},
             {"volume", json_of(*plan.volume)},
             {"real", plan.real},
+            {"path", path_of(plan).path},
+            {"why", path_of(plan).why},
             {"model_word_bits", plan.real ? Json(nullptr) : Json(plan.word_bits)},
             {"skips_empty_space", plan.skips_empty_space},
             {"stages", stages},
@@ -172,13 +188,19 @@ int run(const PlanArguments& a) {
                     v.dims.z, v.scalar_bits, plan.scene.precision.preset);
     if (a.brief) return print(text + brief_text(plan)), kDone;
     text += "\nstages (bits with sign)\n" + stages_text(plan);
-    text += plan.real ? "\nevery wire is a double: nothing is rounded\n" : "\nwires\n" + wires_text(plan);
+    text += plan.float32 ? "\nevery wire is a float32: nothing else is rounded\n"
+            : plan.real  ? "\nevery wire is a double: nothing is rounded\n"
+                         : "\nwires\n" + wires_text(plan);
     text += "\ntables\n" + tables_text(plan);
     text += fmt::format("\nmemory: volume {}{}, tables {}, picture {}\n",
                         text_of_bytes(memory.volume + memory.mapped),
                         memory.mapped > 0 ? " (mapped from its file)" : "", text_of_bytes(memory.tables),
                         text_of_bytes(memory.image));
-    text += plan.real ? "model: double\n" : fmt::format("model: {}-bit integers\n", plan.word_bits);
+    text += plan.float32 ? "model: float32\n"
+            : plan.real  ? "model: double\n"
+                         : fmt::format("model: {}-bit integers\n", plan.word_bits);
+    const PathOf way = path_of(plan);
+    text += fmt::format("path: {}: {}\n", way.path, way.why);
     text += plan.skips_empty_space
                 ? "empty space: skipped where it can be\n"
                 : "empty space: visited, since a transparent sample is not the identity here\n";

@@ -210,9 +210,10 @@ int run(const RenderArguments& a) {
     if (a.json != "-") check_output(a.json, "--json", nullptr);
 
     const Scene scene = read(a.scene);
-    if (a.options.audit && scene.precision.preset == "real")
-        throw InputError(
-            "--audit: precision.preset is \"real\", which rounds no wire; allowed: any other preset");
+    if (a.options.audit && rounds_nothing(scene.precision.preset))
+        throw InputError(fmt::format(
+            "--audit: precision.preset is \"{}\", which rounds no wire; allowed: any other preset",
+            scene.precision.preset));
     refuse_beyond(a.max_memory, image_bytes(scene),
                   fmt::format("a picture of {}x{} pixels", scene.image.width, scene.image.height));
     std::vector<std::string> notes;
@@ -227,7 +228,7 @@ int run(const RenderArguments& a) {
                 {"version", version()},
                 {"scene", json_of_scene(scene)},
                 {"volume", json_of(*job.volume)},
-                {"real", scene.precision.preset == "real"},
+                {"real", rounds_nothing(scene.precision.preset)},
                 {"wires", pictures[0]["wires"]},
                 {"warnings", pictures[0]["warnings"]},
                 {"notes", notes},

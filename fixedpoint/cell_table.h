@@ -59,6 +59,20 @@ class CellTable {
         const std::lock_guard lock(data_->mutex);
         if (data_->exact.empty()) data_->exact = data_->build_exact();
     }
+    /// The same in float32, in half that room; null before need_floats().
+    const float* floats() const { return data_->floats.empty() ? nullptr : data_->floats.data(); }
+    void need_floats() const {
+        if (!data_) return;
+        const std::lock_guard lock(data_->mutex);
+        if (!data_->floats.empty()) return;
+        const std::vector<double> exact = data_->exact.empty() ? data_->build_exact() : data_->exact;
+        data_->floats.reserve(exact.size() + kPadding);
+        data_->floats.assign(exact.begin(), exact.end());
+        data_->floats.resize(exact.size() + kPadding);
+    }
+    float float_at(std::int64_t row, std::int64_t column, int channel) const {
+        return data_->floats[index(row, column, channel)];
+    }
 
   private:
     static constexpr std::size_t kPadding = 8;  // a vector gather may read a whole cell behind the last
@@ -66,6 +80,7 @@ class CellTable {
         std::vector<std::uint16_t> narrow;
         std::vector<std::uint32_t> wide;
         std::vector<double> exact;
+        std::vector<float> floats;
         std::function<std::vector<double>()> build_exact;
         std::mutex mutex;
         std::int64_t largest = 0;
@@ -93,9 +108,11 @@ template <class T>
 std::array<Real<T>, 4> gather_cell(const CellTable& t, Real<T> row, Real<T> column) {
     std::array<Real<T>, 4> cell;
     const auto i = static_cast<std::int64_t>(row.v), j = static_cast<std::int64_t>(column.v);
+    const bool floats = std::is_same_v<T, float> && t.floats();  // then there may be no doubles
     for (int c = 0; c < 4; ++c)
-        cell[static_cast<std::size_t>(c)].v =
-            static_cast<T>(t.active ? static_cast<double>(t.word(i, j, c)) : t.exact(i, j, c));
+        cell[static_cast<std::size_t>(c)].v = t.active ? static_cast<T>(t.word(i, j, c))
+                                              : floats ? static_cast<T>(t.float_at(i, j, c))
+                                                       : static_cast<T>(t.exact(i, j, c));
     return cell;
 }
 /// Any word the format holds; the index, too, must fit.

@@ -234,6 +234,24 @@ template <class L>
 HWY_INLINE L load(const std::int32_t* from) {
     return load(WordTag<L>{}, from);
 }
+/// Of whole numbers, which lie there as integers for every word.
+template <class T, KnownRescales K>
+HWY_INLINE Lanes<T, K> load_whole(WordTag<Lanes<T, K>> tag, const std::int32_t* from) {
+    return load(tag, from);
+}
+template <class T, KnownRescales K>
+HWY_INLINE void store_whole(Lanes<T, K> x, std::int32_t* to) {
+    store(x, to);
+}
+template <class L>
+HWY_INLINE L load_whole(const std::int32_t* from) {
+    return load_whole(WordTag<L>{}, from);
+}
+/// The lower or the upper 16 bits of words as they lie there: one of two voxels.
+template <class T, KnownRescales K>
+HWY_INLINE Lanes<T, K> half_of(Lanes<T, K> both, bool upper) {
+    return {hn::And(upper ? hn::ShiftRight<16>(both.v) : both.v, hn::Set(hn::ScalableTag<T>(), T{0xffff}))};
+}
 
 }  // namespace squint::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -47,6 +47,11 @@ class Table {
     /// rows.  Null where a word does not fit.  Made by pair_rows(), once the table is built.
     const std::int32_t* paired() const { return data_ ? data_->paired.get() : nullptr; }
     void pair_rows();
+    /// The exact values in float32, for lanes of floats; null before need_floats().
+    const float* floats() const { return data_ && !data_->floats.empty() ? data_->floats.data() : nullptr; }
+    void need_floats() const {
+        if (data_ && data_->floats.empty()) data_->floats.assign(data_->exact.begin(), data_->exact.end());
+    }
     std::size_t bytes() const { return !data_ ? 0 : data_->size * (narrow() ? 4 : 8); }
 
     void set(int row, int column, double value, const Spec& spec) {
@@ -73,6 +78,7 @@ class Table {
         std::unique_ptr<std::int64_t[]> wide;
         std::unique_ptr<std::int32_t[]> paired;
         std::vector<double> exact;
+        std::vector<float> floats;
     };
     void put(std::size_t at, double exact_raw, std::int64_t raw);
     void widen();

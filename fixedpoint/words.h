@@ -14,7 +14,7 @@
 // Range        intervals: what a stage's exact results can reach, and so how wide a word it needs
 //              (pipeline/plan.cpp)
 //
-// Lanes        many samples side by side: lanes.h, lane_tables.h, lane_quotients.h
+// Lanes        many samples side by side: lanes.h, lane_tables.h, lane_quotients.h, float_lanes.h
 #pragma once
 
 #include "fixedpoint/audit.h"
@@ -241,8 +241,14 @@ struct Real {
     friend constexpr Real operator+(Real a, Real b) { return {a.v + b.v}; }
     friend constexpr Real operator-(Real a, Real b) { return {a.v - b.v}; }
     friend constexpr Real operator*(Real a, Real b) { return {a.v * b.v}; }
+    friend constexpr Real operator/(Real a, Real b) { return {a.v / b.v}; }
     friend constexpr bool operator==(Real a, Real b) { return a.v == b.v; }
     friend constexpr bool operator<(Real a, Real b) { return a.v < b.v; }
+};
+/// Real<T> and lanes of floats.
+template <class W>
+concept RealWord = requires {
+    typename W::IsReal;
 };
 /// 2^bits, |bits| < 1000.
 template <class T>
@@ -272,8 +278,17 @@ constexpr Real<T> max(Real<T> a, Real<T> b) {
     return a < b ? b : a;
 }
 template <class T>
-constexpr Real<T> absolute(Real<T> x) {
-    return {x.v < 0 ? -x.v : x.v};
+Real<T> absolute(Real<T> x) {
+    return {std::abs(x.v)};
+}
+template <class T>
+Real<T> square_root(Real<T> x) {
+    return {std::sqrt(x.v)};
+}
+/// 2^x of whole numbers, -127 < x < 128.
+template <class T>
+Real<T> whole_power_of_two(Real<T> x) {
+    return {power_of_two<T>(static_cast<int>(x.v))};
 }
 template <class T>
 constexpr Real<T> select(bool c, Real<T> yes, Real<T> no) {

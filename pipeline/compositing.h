@@ -80,9 +80,9 @@ template <class W>
 HWY_INLINE auto goes_on(const CompositingStage& s, const Accumulated<W>& pixel) {
     return !(transparency(s, pixel) < constant<W>(s.threshold));
 }
-template <class T>
-HWY_INLINE bool goes_on(const CompositingStage& s, const Accumulated<Real<T>>& pixel) {
-    return !(transparency(s, pixel).v < s.threshold_exact * static_cast<double>(s.unit()));
+template <RealWord W>
+HWY_INLINE auto goes_on(const CompositingStage& s, const Accumulated<W>& pixel) {
+    return !(transparency(s, pixel) < W::from(s.threshold_exact * static_cast<double>(s.unit())));
 }
 
 /// x y with 1.0 = 2^F - 1: one bare shift, or Blinn's exact rounding of x y / (2^F - 1) (Squeeze, equation
@@ -95,9 +95,9 @@ HWY_INLINE W unit_product(const CompositingStage& s, W x, W y) {
     return floor_shift(sum + floor_shift(sum, bits), bits);
 }
 /// Without rounding both are the product itself.
-template <class T>
-HWY_INLINE Real<T> unit_product(const CompositingStage& s, Real<T> x, Real<T> y) {
-    return {x.v * y.v / static_cast<T>(s.unit())};
+template <RealWord W>
+HWY_INLINE W unit_product(const CompositingStage& s, W x, W y) {
+    return x * y / constant<W>(s.unit());
 }
 
 /// One slab onto a pixel.

@@ -168,15 +168,16 @@ HWY_INLINE std::array<W, 3> normalise(const GradientStage& s, const std::array<W
 }
 
 /// Without rounding the definition itself will do.
-template <class T>
-HWY_INLINE std::array<Real<T>, 3> normalise(const GradientStage& s, const std::array<Real<T>, 3>& g) {
-    const T length = std::sqrt(g[0].v * g[0].v + g[1].v * g[1].v + g[2].v * g[2].v);
-    if (!(length > 0)) return {};
+template <RealWord W>
+HWY_INLINE std::array<W, 3> normalise(const GradientStage& s, const std::array<W, 3>& g) {
+    const W zero = constant<W>(0), length = square_root(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
     Rescale raw = s.to_normal;
     raw.shift = 0;
-    const T scale = -power_of_two<T>(s.normal_fraction) / length;
-    return {quantise(Real<T>{g[0].v * scale}, raw), quantise(Real<T>{g[1].v * scale}, raw),
-            quantise(Real<T>{g[2].v * scale}, raw)};
+    const W scale = W::from(-power_of_two<double>(s.normal_fraction)) / length;
+    const auto component = [&](std::size_t a) SQUINT_WRITTEN_OUT {
+        return select(zero < length, quantise(g[a] * scale, raw), zero);
+    };
+    return {component(0), component(1), component(2)};
 }
 
 }  // namespace squint::HWY_NAMESPACE

@@ -87,6 +87,9 @@ void cast_tile(const Plan& plan, int left, int top, int right, int bottom, Image
 void store_pixel(const Plan& plan, const Pixel<std::int64_t>& pixel, int column, int row, Image& image) {
     store(plan, pixel, column, row, image);
 }
+void store_pixel(const Plan& plan, const Pixel<Real<float>>& pixel, int column, int row, Image& image) {
+    store(plan, pixel, column, row, image);
+}
 
 void ModelRenderer::render_tile(int left, int top, int right, int bottom, Image& image,
                                 TileStatistics& statistics) const {
@@ -95,6 +98,8 @@ void ModelRenderer::render_tile(int left, int top, int right, int bottom, Image&
         statistics.wires = std::make_unique<std::array<WireStatistics, kWires>>();
         attach_statistics(audited, *statistics.wires);
         cast_tile<Audited>(audited, left, top, right, bottom, image, statistics);
+    } else if (plan_.float32) {
+        cast_tile<Real<float>>(plan_, left, top, right, bottom, image, statistics);
     } else if (plan_.real) {
         cast_tile<Real<double>>(plan_, left, top, right, bottom, image, statistics);
     } else if (plan_.word_bits == 64) {
@@ -106,7 +111,7 @@ void ModelRenderer::render_tile(int left, int top, int right, int bottom, Image&
 
 std::string ModelRenderer::why() const {
     if (audit_ && !plan_.real) return "audited integers";
-    if (plan_.real) return "double";
+    if (plan_.real) return plan_.float32 ? "float32" : "double";
     return plan_.word_bits == 64 ? "64-bit integers" : "128-bit integers";
 }
 

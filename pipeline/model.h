@@ -21,6 +21,7 @@ struct Pixel;
 
 /// A finished pixel into every channel of an image: where fixed point meets float.
 void store_pixel(const Plan& plan, const Pixel<std::int64_t>& pixel, int column, int row, Image& image);
+void store_pixel(const Plan& plan, const Pixel<Real<float>>& pixel, int column, int row, Image& image);
 
 class ModelRenderer {
   public:

@@ -362,7 +362,8 @@ void plan_compositing(Plan& plan) {
     s.threshold = static_cast<std::int64_t>(std::ceil(s.threshold_exact * static_cast<double>(s.unit())));
     const bool identity = s.form != CompositingForm::unit255_shift &&
                           plan.scene.compositing.mode != CompositingMode::average &&
-                          plan.scene.compositing.mode != CompositingMode::minip;
+                          plan.scene.compositing.mode != CompositingMode::minip &&
+                          !(plan.float32 && s.is_unit255());  // t u / u is not always t
     plan.skips_empty_space = identity;
     if (s.form == CompositingForm::w && plan.specs[Wire::contribution].rounding == Rounding::trn &&
         !plan.real)
@@ -528,6 +529,24 @@ RaySetup Plan::set_up(int column, int row) const {
             .entry_distance = ray.entry_distance};
 }
 
+namespace {
+// What lanes of floats need: tables in floats, and room for float's own errors.
+void prepare_floats(Plan& plan) {
+    need_floats(plan.method);
+    plan.shading.power_table.need_floats();
+    // Lanes ask whether an entry is opaque where any of them is near one: none may be missed.
+    const auto lower = [](EntryLookup& e) { e.least_opaque -= e.least_opaque >> 20; };
+    std::visit(
+        [&](auto& m) {
+            if constexpr (requires { m.entries.least_opaque; })
+                lower(m.entries);
+            else
+                lower(m.prefix.entries);
+        },
+        plan.method);
+}
+}  // namespace
+
 Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int frame) {
     Plan plan;
     plan.scene = scene;
@@ -544,7 +563,8 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
     plan.projection_mode = scene.compositing.mode != CompositingMode::over;
     plan.lit = !scene.lights.empty() && scene.shading.model != ShadingModel::none && !plan.projection_mode;
     const PrecisionSettings precision = resolved_precision(scene);
-    plan.real = precision.preset == "real";
+    plan.float32 = precision.preset == "float32";
+    plan.real = rounds_nothing(precision.preset);
     plan.wants_depth = scene.output.depth;
     preset_specs(precision.preset, preset_inputs(plan), plan.specs);
     apply_overrides(precision, plan.specs);
@@ -559,17 +579,19 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
     plan_compositing(plan);
     choose_words(plan);
     if (plan.real) set_active(plan, {});
+    if (plan.float32) prepare_floats(plan);
     return plan;
 }
 
 namespace {
 struct Activate {
     const std::array<bool, kWires>& rounded;
+    bool floats = false;  // unrounded cells of them will do
     void operator()(Rescale& r) const { r.active = r.wire >= 0 && rounded[static_cast<std::size_t>(r.wire)]; }
     void operator()(Table& t) const { t.active = t.wire >= 0 && rounded[static_cast<std::size_t>(t.wire)]; }
     void operator()(CellTable& t) const {
         t.active = t.wire >= 0 && rounded[static_cast<std::size_t>(t.wire)];
-        if (!t.active) t.need_exact();
+        if (!t.active && !floats) t.need_exact();
     }
 };
 struct Attach {
@@ -584,8 +606,10 @@ struct Attach {
 
 void set_active(Plan& plan, const std::array<bool, kWires>& rounded) {
     need_exact(plan.method, classification_inputs(plan));
-    visit_stages(plan, Activate{rounded});
-    Activate{rounded}(plan.to_average);
+    plan.float32 = plan.float32 && std::none_of(rounded.begin(), rounded.end(), [](bool r) { return r; });
+    const Activate activate{rounded, plan.float32};
+    visit_stages(plan, activate);
+    activate(plan.to_average);
     const auto is = [&](Wire w) { return rounded[static_cast<std::size_t>(w)]; };
     plan.input.active = is(Wire::classification_input);
     plan.gradient.active = is(Wire::spacing);

@@ -40,7 +40,8 @@ struct Plan {
     Camera camera;
     Entries entries;
     WireSpecs specs;
-    bool real = false;      // preset `real`: doubles, nothing quantised
+    bool real = false;      // presets `real` and `float32`: nothing quantised, words are doubles
+    bool float32 = false;   // or floats
     double step_world = 1;  // length of a full slab
     Vec3 box_low{0, 0, 0}, box_high{0, 0, 0};  // what of the volume is rendered, world
 
@@ -59,8 +60,9 @@ struct Plan {
     Rescale to_average;             // average mode: sum of inputs over their number
     bool skips_empty_space = true;  // a transparent sample is the identity
 
-    WordNeeds gradient_needs, normal_needs;  // of stage 3's two halves: up to the raw gradient, and normalising it
-    WordNeeds input_needs;                   // of a sample on its way to table entries, between stages 2 and 4
+    WordNeeds gradient_needs,
+        normal_needs;       // of stage 3's two halves: up to the raw gradient, and normalising it
+    WordNeeds input_needs;  // of a sample on its way to table entries, between stages 2 and 4
     int word_bits = 64;     // of the golden model: 64 or 128
     std::vector<StageReport> stages;
     std::vector<TableReport> tables;
@@ -68,6 +70,8 @@ struct Plan {
     std::vector<std::string> warnings;  // what a user should mend
 
     RaySetup set_up(int column, int row) const;
+    /// The preset whose words these are, where none is quantised.
+    std::string real_name() const { return float32 ? "float32" : "real"; }
     Spec spec(Wire wire) const { return specs[wire]; }
 };
 

@@ -124,7 +124,7 @@ WireSpecs wide(const PresetInputs& in) {
 }  // namespace
 
 const std::vector<std::string>& preset_names() {
-    static const std::vector<std::string> names{"default", "squeeze", "eight_bit", "wide", "real"};
+    static const std::vector<std::string> names{"default", "squeeze", "eight_bit", "wide", "real", "float32"};
     return names;
 }
 
@@ -134,11 +134,15 @@ int accumulating_bits(const PresetInputs& in) {
     return std::clamp(9 + in.ray_bits, kOfThirtyTwoBits, kMostFractionBits);
 }
 
+bool rounds_nothing(std::string_view preset) {
+    return preset == "real" || preset == "float32";
+}
+
 bool preset_specs(std::string_view name, const PresetInputs& inputs, WireSpecs& specs) {
     if (name == "default") return specs = standard(inputs), true;
     if (name == "squeeze") return specs = squeeze(inputs), true;
     if (name == "eight_bit") return specs = eight_bit(inputs), true;
-    if (name == "wide" || name == "real") return specs = wide(inputs), true;
+    if (name == "wide" || rounds_nothing(name)) return specs = wide(inputs), true;
     return false;
 }
 

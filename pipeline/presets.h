@@ -30,8 +30,11 @@ const std::vector<std::string>& preset_names();
 /// which keeps half a last bit at every sample below half an LSB8 of the picture (MATH, B5 and C6).
 int accumulating_bits(const PresetInputs& inputs);
 
-/// Fills `specs`; false if the name is unknown.  `real` has the formats of `wide`, which say where its raw
-/// units stand.
+/// The presets that round no wire: `real` in double, `float32` in float.
+bool rounds_nothing(std::string_view preset);
+
+/// Fills `specs`; false if the name is unknown.  `real` and `float32` have the formats of `wide`, which say
+/// where their raw units stand.
 bool preset_specs(std::string_view name, const PresetInputs& inputs, WireSpecs& specs);
 
 /// Every wire of every preset as a Markdown table, for 12-bit scalars, 4096 entries, axes of 256 voxels and a

@@ -53,7 +53,7 @@ Attributes exr_attributes(const Plan& plan, int frame) {
     for (int w = 0; w < kWires; ++w) {
         const auto wire = static_cast<Wire>(w);
         attributes[fmt::format("squint.wire.{}", info(wire).name)] =
-            plan.real ? "real" : to_string(plan.specs[wire]);
+            plan.real ? plan.real_name() : to_string(plan.specs[wire]);
     }
     attributes["squint.volume.hash"] = plan.volume->content_hash;
     attributes["squint.version"] = version();
@@ -193,7 +193,7 @@ Json json_of_wires(const Plan& plan) {
         const auto wire = static_cast<Wire>(w);
         const Spec& spec = plan.specs[wire];
         if (plan.real) {
-            json[std::string(info(wire).name)] = {{"stage", info(wire).stage}, {"format", "real"}};
+            json[std::string(info(wire).name)] = {{"stage", info(wire).stage}, {"format", plan.real_name()}};
             continue;
         }
         json[std::string(info(wire).name)] = {{"stage", info(wire).stage},

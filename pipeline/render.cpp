@@ -64,7 +64,8 @@ Rendering render(const Plan& plan, const RenderOptions& options) {
     const ModelRenderer model(plan, options.audit);
     statistics.path = fast ? "lanes" : "model";
     statistics.target = fast ? fast->target() : "";
-    statistics.why = fast ? fast->why() : model.why() + (obstacle && !plan.real ? ": " + *obstacle : "");
+    statistics.why =
+        fast ? fast->why() : model.why() + (obstacle && (!plan.real || plan.float32) ? ": " + *obstacle : "");
     statistics.layout = fast ? fast->layout() : "linear";
     statistics.setup_seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - setup_start).count();

@@ -127,7 +127,7 @@ struct OutputSettings {
 };
 
 struct PrecisionSettings {
-    std::string preset = "default";  // default, squeeze, eight_bit, wide, real, or a preset file
+    std::string preset = "default";  // default, squeeze, eight_bit, wide, real, float32, or a file
     std::array<std::optional<std::string>, kWires>
         override_;  // "u1.15 trn sat", by wire; parts may be left out
 };
@@ -232,7 +232,7 @@ void visit_scene(S& scene, V&& visit) {
     visit("output.transparency", scene.output.transparency, "channel T");
     visit("output.fixed", scene.output.fixed, "channels fixed.R fixed.G fixed.B fixed.T: the raw words");
     visit("precision.preset", scene.precision.preset,
-          "default, squeeze, eight_bit, wide, real or a preset file");
+          "default, squeeze, eight_bit, wide, real, float32 or a preset file");
     for (int i = 0; i < kWires; ++i) {
         const auto& wire = kWireInfo[static_cast<std::size_t>(i)];
         visit("precision." + std::string(wire.name), scene.precision.override_[static_cast<std::size_t>(i)],
@@ -271,7 +271,8 @@ std::string expand_path(const std::string& text, const std::string& folder, cons
 VolumeSource volume_source(const Scene& scene);
 
 /// The built-in precision presets.
-inline constexpr std::string_view kPrecisionPresets[] = {"default", "squeeze", "eight_bit", "wide", "real"};
+inline constexpr std::string_view kPrecisionPresets[] = {"default", "squeeze", "eight_bit",
+                                                         "wide",    "real",    "float32"};
 /// The precision with a preset file, if one is named, merged under the scene's own wires: `preset` is then a
 /// built-in one. A preset file is TOML with one table, [precision]: a built-in `preset` and wires.  Throws
 /// InputError.

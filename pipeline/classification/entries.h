@@ -103,7 +103,8 @@ struct ClassificationInputs {
     const ClassificationSettings& settings;
     double step_world = 1;  // length of a full slab
     int input_fraction = 0;
-    bool keeps_exact = true;  // unrounded values beside the words: what Real reads of a wire that is not rounded
+    bool keeps_exact =
+        true;  // unrounded values beside the words: what Real reads of a wire that is not rounded
 };
 
 /// The entries in words.  Throws InputError for formats that cannot hold them.
@@ -117,6 +118,7 @@ void require_range(const WireSpecs& specs, Wire wire, double largest, const char
 #endif
 
 #include "pipeline/interpolation.h"
+#include "pipeline/location.h"
 
 #include <hwy/highway.h>
 #if defined(SQUINT_PIPELINE_CLASSIFICATION_ENTRIES_TARGET) == defined(HWY_TARGET_TOGGLE)
@@ -133,12 +135,10 @@ HWY_INLINE W classification_input(const InputStage& s, W sample) {
     if (s.scaled) sample = sample * constant<W>(s.scale);
     return clamp(quantise(sample, s.to_input), constant<W>(0), constant<W>(s.highest));
 }
-template <class T>
-HWY_INLINE Real<T> classification_input(const InputStage& s, Real<T> sample) {
-    if (s.scaled)
-        sample.v *= static_cast<T>(s.active ? static_cast<double>(s.scale)
-                                            : s.scale_exact * power_of_two<double>(s.scale_fraction));
-    return clamp(quantise(sample, s.to_input), constant<Real<T>>(0), constant<Real<T>>(s.highest));
+template <RealWord W>
+HWY_INLINE W classification_input(const InputStage& s, W sample) {
+    if (s.scaled) sample = sample * stage_constant<W>(s.scale, s.scale_exact, s.scale_fraction, s.active);
+    return clamp(quantise(sample, s.to_input), constant<W>(0), constant<W>(s.highest));
 }
 
 template <class W>
@@ -150,13 +150,29 @@ HWY_INLINE W opacity_of_depth(const OpacityUnit& unit, W depth) {
         blend(gather(unit.rows, row, 0), gather(unit.rows, row + constant<W>(1), 0), rest, fraction),
         unit.to_alpha);
 }
+/// 1 - exp(-x) for x >= 0 in float32: -x = n ln 2 + r, |r| <= ln 2 / 2, exp(r) - 1 by its series to r^7,
+/// which is 2^-26 of r off at most.
+template <RealWord W>
+HWY_INLINE W one_minus_exp(W x) {
+    const auto k = [](double value) { return W::from(value); };
+    const W y = k(0) - min(x, k(80));  // opaque to the last bit, and 2^n in range
+    const W n = floor_shift(y * k(1.44269504088896341) + k(0.5), 0);
+    // ln 2 in two parts, the first with bits to spare for n.
+    const W r = (y - n * k(0x1.62ep-1)) - n * k(0x1.0bfbe8e7bcd5ep-15);
+    const W tail =
+        k(1.0 / 6) + r * (k(1.0 / 24) + r * (k(1.0 / 120) + r * (k(1.0 / 720) + r * k(1.0 / 5040))));
+    const W grown = r + r * r * (k(0.5) + r * tail), unit = whole_power_of_two(n);
+    return (k(1) - unit) - unit * grown;
+}
+inline Real<double> one_minus_exp(Real<double> x) {
+    return {-portable::expm1(-x.v)};
+}
 /// Without rounding: the function itself, where its result is not rounded either.
-template <class T>
-HWY_INLINE Real<T> opacity_of_depth(const OpacityUnit& unit, Real<T> depth) {
+template <RealWord W>
+HWY_INLINE W opacity_of_depth(const OpacityUnit& unit, W depth) {
     Rescale raw = unit.to_alpha;
     raw.shift = 0;
-    const double x = static_cast<double>(depth.v) * power_of_two<double>(-unit.depth_fraction);
-    return quantise(Real<T>{static_cast<T>(-portable::expm1(-x) * power_of_two<double>(unit.alpha_fraction))},
+    return quantise(shift_left(one_minus_exp(shift_left(depth, -unit.depth_fraction)), unit.alpha_fraction),
                     raw);
 }
 

@@ -64,4 +64,27 @@ void need_exact(ClassificationMethod& method, ClassificationInputs inputs) {
     std::visit(build, method);
 }
 
+namespace {
+struct MakeFloats {
+    void operator()(const Table& t) const { t.need_floats(); }
+    void operator()(const CellTable& t) const { t.need_floats(); }
+    void operator()(const Rescale&) const {}
+};
+}  // namespace
+
+void need_floats(ClassificationMethod& method) {
+    std::visit([](auto& m) { m.visit(MakeFloats{}); }, method);
+    if (auto* series = std::get_if<PowerSeriesOfOrder1>(&method)) {
+        const Table &depth = series->prefix.depth, &moment = series->moment;
+        const auto n = static_cast<std::size_t>(moment.rows()),
+                   stride = static_cast<std::size_t>(depth.columns());
+        std::vector<float> rows(4 * n);
+        for (std::size_t i = 0; i < n; ++i) {
+            rows[4 * i] = depth.floats()[stride * i];
+            std::copy_n(moment.floats() + 3 * i, 3, rows.begin() + static_cast<std::ptrdiff_t>(4 * i + 1));
+        }
+        series->float_rows = std::make_shared<const std::vector<float>>(std::move(rows));
+    }
+}
+
 }  // namespace squint

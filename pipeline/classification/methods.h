@@ -40,5 +40,8 @@ ClassificationMethod build_method(const ClassificationInputs& inputs);
 /// method keep theirs.
 void need_exact(ClassificationMethod& method, ClassificationInputs inputs);
 
+/// Gives lanes of floats their tables, once there are unrounded values.
+void need_floats(ClassificationMethod& method);
+
 }  // namespace squint
 #endif

@@ -22,6 +22,7 @@ struct PowerSeriesOfOrder1 {
     PrefixLookup prefix;
     Table moment;  // three columns: X[i], colour over depth, a row for every row of T
     std::shared_ptr<const std::vector<std::int32_t>> rows;  // T and X1 side by side, for 32-bit lanes
+    std::shared_ptr<const std::vector<float>> float_rows;   // the same, unrounded, for lanes of floats
     std::int64_t most_rise = 0;                             // of T or X1 from row to row
     Rescale to_ratio;
     std::int64_t one_ratio = 0;

@@ -52,10 +52,11 @@ struct StageKernels {
     void (*composite)(const Plan&, const RayPacket&, int steps, const Samples&, PixelPacket&) = nullptr;
 };
 
-/// How one stage runs: bits of its lanes, 32 or 64, and what its kernel may take for granted.
+/// How one stage runs: bits of its lanes, 32 or 64, and what its kernel may take for granted; or in floats.
 struct StageWay {
     int bits = 32;
     KnownRescales known = KnownRescales::nothing;
+    bool is_float = false;
 };
 struct StageWays {
     StageWay location, interpolation, classification, compositing;
@@ -83,13 +84,20 @@ void compositing_kernel(std::int64_t target, const Plan& plan, const StageWay& w
 
 /// Calls f with the word for a way; `Known` is what a kernel is compiled to take for granted where it can.
 template <template <class, KnownRescales> class Lanes, KnownRescales Known, class F>
-void with_word(const StageWay& way, F&& f) {
+void with_integer_word(const StageWay& way, F&& f) {
     if (way.bits == 64)
         f.template operator()<Lanes<std::int64_t, KnownRescales::nothing>>();
     else if (way.known >= Known)
         f.template operator()<Lanes<std::int32_t, Known>>();
     else
         f.template operator()<Lanes<std::int32_t, KnownRescales::nothing>>();
+}
+template <template <class, KnownRescales> class Lanes, KnownRescales Known, class F>
+void with_word(const StageWay& way, F&& f) {
+    if (way.is_float)
+        f.template operator()<Lanes<float, KnownRescales::nothing>>();
+    else
+        with_integer_word<Lanes, Known>(way, f);
 }
 
 }  // namespace squint::lanes

@@ -5,6 +5,7 @@
 #define HWY_TARGET_INCLUDE "pipeline/lanes/kernels_classification.cpp"
 #include <hwy/foreach_target.h>
 
+#include "fixedpoint/float_lanes.h"
 #include "fixedpoint/lane_quotients.h"
 #include "fixedpoint/lane_tables.h"
 #include "pipeline/classification/methods.h"
@@ -18,6 +19,11 @@ template <KnownRescales K>
 HWY_INLINE std::array<std::array<Lanes<std::int32_t, K>, 4>, 2> prefix_rows(const PowerSeriesOfOrder1& m,
                                                                             Lanes<std::int32_t, K> row) {
     return load_two_rows(m.rows->data(), row);
+}
+template <KnownRescales K>
+HWY_INLINE std::array<std::array<Lanes<float, K>, 4>, 2> prefix_rows(const PowerSeriesOfOrder1& m,
+                                                                     Lanes<float, K> row) {
+    return load_two_rows(m.float_rows->data(), row);
 }
 
 namespace {
@@ -56,7 +62,13 @@ void classification_kernel_of(const Plan& plan, const lanes::StageWay& way, lane
             constexpr KnownRescales kKnown = std::is_same_v<M, PostClassification>
                                                  ? KnownRescales::halves_up
                                                  : KnownRescales::halves_to_even;
-            lanes::with_word<Lanes, kKnown>(way, [&]<class L>() { kernels.classify = &classify_rows<L, M>; });
+            if constexpr (!std::is_same_v<M, MomentSeries>)  // its float words run in the model
+                if (way.is_float) {
+                    kernels.classify = &classify_rows<Lanes<float>, M>;
+                    return;
+                }
+            lanes::with_integer_word<Lanes, kKnown>(
+                way, [&]<class L>() { kernels.classify = &classify_rows<L, M>; });
         },
         plan.method);
 }

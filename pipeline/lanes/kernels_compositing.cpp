@@ -5,6 +5,7 @@
 #define HWY_TARGET_INCLUDE "pipeline/lanes/kernels_compositing.cpp"
 #include <hwy/foreach_target.h>
 
+#include "fixedpoint/float_lanes.h"
 #include "fixedpoint/lanes.h"
 #include "pipeline/compositing.h"
 #include "pipeline/lanes/kernels.h"
@@ -45,9 +46,9 @@ void composite_rows(const Plan& plan, const lanes::RayPacket& packet, int steps,
         Accumulated<L> pixel{
             {load<L>(pixels.color[0].v + r), load<L>(pixels.color[1].v + r), load<L>(pixels.color[2].v + r)},
             load<L>(pixels.transparency.v + r)};
-        const L slabs = load<L>(packet.slabs.v + r);
-        auto active = zero < load<L>(pixels.active.v + r);
-        L count = load<L>(pixels.samples.v + r);
+        const L slabs = load_whole<L>(packet.slabs.v + r);
+        auto active = zero < load_whole<L>(pixels.active.v + r);
+        L count = load_whole<L>(pixels.samples.v + r);
         for (int i = 0; i < steps; ++i) {
             const int step = backwards ? steps - 1 - i : i;
             const int at = step * lanes::kRays + r;
@@ -71,8 +72,8 @@ void composite_rows(const Plan& plan, const lanes::RayPacket& packet, int steps,
         }
         for_three([&](std::size_t c) SQUINT_WRITTEN_OUT { store(pixel.color[c], pixels.color[c].v + r); });
         store(pixel.transparency, pixels.transparency.v + r);
-        store(count, pixels.samples.v + r);
-        store(select(active, one, zero), pixels.active.v + r);
+        store_whole(count, pixels.samples.v + r);
+        store_whole(select(active, one, zero), pixels.active.v + r);
     }
 }
 

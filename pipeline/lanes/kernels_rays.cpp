@@ -28,6 +28,13 @@ HWY_INLINE void store_words(Reals x, Word* to) {
     hn::StoreU(hn::DemoteTo(narrow, x.v), narrow, to);
 }
 
+HWY_INLINE void store_values(bool as_floats, Reals x, Word* to) {
+    if (!as_floats) return store_words(x, to);
+    const hn::Rebind<float, Reals::D> narrow;
+    const hn::Rebind<Word, Reals::D> bits;
+    hn::StoreU(hn::BitCast(bits, hn::DemoteTo(narrow, x.v)), bits, to);
+}
+
 void set_up_rays(const Plan& plan, const lanes::PacketPlace& place, lanes::RayPacket& packet) {
     Reals most(0.0), rays(0.0);
     for (int r = 0; r < kRays; r += Reals::count()) {
@@ -41,16 +48,17 @@ void set_up_rays(const Plan& plan, const lanes::PacketPlace& place, lanes::RayPa
 
         const RayWords<Reals> words = ray_words<Reals>(plan, ray);
         for (std::size_t a = 0; a < 3; ++a) {
-            store_words(words.first[a], packet.first[a].v + r);
-            store_words(words.last[a], packet.last[a].v + r);
-            store_words(words.step[a], packet.step[a].v + r);
+            store_values(plan.float32, words.first[a], packet.first[a].v + r);
+            store_values(plan.float32, words.last[a], packet.last[a].v + r);
+            store_values(plan.float32, words.step[a], packet.step[a].v + r);
             if (!plan.lit) continue;
-            store_words(words.view[a], packet.view[a].v + r);
+            store_values(plan.float32, words.view[a], packet.view[a].v + r);
             for (int l = 0; plan.shading.half_per_ray && l < plan.shading.lights; ++l)
-                store_words(words.half[static_cast<std::size_t>(l)][a], packet.half[l][a].v + r);
+                store_values(plan.float32, words.half[static_cast<std::size_t>(l)][a],
+                             packet.half[l][a].v + r);
         }
         store_words(words.last_index, packet.last_index.v + r);
-        store_words(words.last_length, packet.last_length.v + r);
+        store_values(plan.float32, words.last_length, packet.last_length.v + r);
         store_words(ray.slabs, packet.slabs.v + r);
         hn::StoreU(ray.entry_distance.v, Reals::D(), packet.entry_distance + r);
     }
@@ -75,18 +83,26 @@ void set_course(const Plan& plan, const lanes::EmptySpace& empty, const lanes::R
     course.margin = float_power(-stage.location_fraction) +
                     static_cast<float>(std::max({n.x, n.y, n.z})) * 0x1p-20F + 0x1p-10F;
     const int to_block = stage.location_fraction + lanes::kBlockBits;
+    const auto value_at = [&](const Word* from) HWY_ATTR {  // in raw units
+        const auto bits = hn::Load(d, from);
+        return plan.float32 ? hn::BitCast(df, bits) : hn::ConvertTo(df, bits);
+    };
+    const auto block_at = [&](const Word* from) HWY_ATTR {
+        if (plan.float32)
+            return hn::ShiftRight<lanes::kBlockBits>(hn::ConvertTo(d, hn::Mul(value_at(from), cell_unit)));
+        return shift_right_same(hn::Load(d, from), to_block);
+    };
     for (int r = 0; r < kRays; r += static_cast<int>(hn::Lanes(d))) {
         auto block = hn::Zero(d);  // of the ray's last sample
         for (int a = 2; a >= 0; --a) {
-            const auto step = hn::Mul(hn::ConvertTo(df, hn::Load(d, rays.step[a].v + r)), step_unit);
-            hn::Store(hn::Mul(hn::ConvertTo(df, hn::Load(d, rays.first[a].v + r)), cell_unit), df,
-                      course.first[a].v + r);
+            const auto step = hn::Mul(value_at(rays.step[a].v + r), step_unit);
+            hn::Store(hn::Mul(value_at(rays.first[a].v + r), cell_unit), df, course.first[a].v + r);
             hn::Store(step, df, course.step[a].v + r);
             const auto still = hn::Eq(step, hn::Zero(df));
             const auto pace =
                 hn::Div(hn::Set(df, 1.0F), hn::Abs(hn::IfThenElse(still, hn::Set(df, 1.0F), step)));
             hn::Store(hn::IfThenElse(still, hn::Set(df, 1e30F), pace), df, course.pace[a].v + r);
-            const auto of_all = shift_right_same(hn::Load(d, rays.last[a].v + r), to_block);
+            const auto of_all = block_at(rays.last[a].v + r);
             const auto here =
                 hn::Min(hn::Max(hn::Sub(of_all, hn::Set(d, static_cast<Word>(low[a]))), hn::Zero(d)),
                         hn::Set(d, static_cast<Word>(blocks[a] - 1)));

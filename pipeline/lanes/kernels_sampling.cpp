@@ -5,6 +5,7 @@
 #define HWY_TARGET_INCLUDE "pipeline/lanes/kernels_sampling.cpp"
 #include <hwy/foreach_target.h>
 
+#include "fixedpoint/float_lanes.h"
 #include "fixedpoint/lane_tables.h"
 #include "pipeline/classification/entries.h"
 #include "pipeline/interpolation.h"
@@ -23,9 +24,9 @@ void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int
     const L full = constant<L>(std::int64_t{1} << stage.length_fraction);
     for (int r = 0; r < kRays; r += static_cast<int>(L::count())) {
         RayWords<L> ray;
-        // P0 + kV by adding V: exact, so the same.
+        // P0 + kV by adding V: exact, so the same, but for floats.
         std::array<L, 3> exact, strides, location;
-        ray.last_index = load<L>(packet.last_index.v + r);
+        ray.last_index = load_whole<L>(packet.last_index.v + r);
         const L start = constant<L>(out.first + from);
         for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
             ray.first[a] = load<L>(packet.first[a].v + r);
@@ -35,17 +36,18 @@ void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int
             strides[a] = stride(stage, ray, static_cast<int>(a));
         });
         const L last_length = load<L>(packet.last_length.v + r);
-        const L last_slab = load<L>(packet.slabs.v + r) - constant<L>(1);
+        const L last_slab = load_whole<L>(packet.slabs.v + r) - constant<L>(1);
         for (int row = from; row < to; ++row) {
             const int at = row * kRays + r;
             const L k = constant<L>(out.first + row);
             for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+                if constexpr (RealWord<L>) exact[a] = exact_location(stage, ray, k, static_cast<int>(a));
                 location[a] = rounded_location(stage, ray, exact[a], k, static_cast<int>(a));
-                exact[a] = exact[a] + strides[a];
+                if constexpr (!RealWord<L>) exact[a] = exact[a] + strides[a];
             });
             const CellPosition<L> position = cell_position(stage, location);
             for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
-                store(position.cell[a], out.cell[a].v + at);
+                store_whole(position.cell[a], out.cell[a].v + at);
                 store(position.weight[a], out.weight[a].v + at);
             });
             store(select(k == last_slab, last_length, full), out.length.v + at);
@@ -57,12 +59,9 @@ void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int
 template <class L, bool kBelow15Bits>
 struct PackedCell {
     std::array<L, 4> pair;
-    L at(int i) const {
-        const auto both = pair[static_cast<std::size_t>(i / 2)].v;
-        return {hn::And(i % 2 ? hn::ShiftRight<16>(both) : both, constant<L>(0xffff).v)};
-    }
+    L at(int i) const { return half_of(pair[static_cast<std::size_t>(i / 2)], i % 2 != 0); }
     L along_x(int i, L weight, int weight_bits, const Rescale& to) const {
-        if constexpr (sizeof(typename L::Element) == 4)
+        if constexpr (std::is_same_v<typename L::Element, std::int32_t>)
             if (weight_bits <= 14)
                 return blend_pairs<L::kKnown>(signed_pairs<kBelow15Bits>(pair[static_cast<std::size_t>(i)].v),
                                               pair_weights(weight.v, weight_bits),
@@ -99,10 +98,10 @@ void sampling_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::
     lanes::with_word<Lanes, KnownRescales::halves_up>(ways.location,
                                                       [&]<class L>() { kernels.locate = &locate_rows<L>; });
     lanes::with_word<Lanes, KnownRescales::halves_up>(ways.interpolation, [&]<class L>() {
-        if constexpr (sizeof(typename L::Element) == 8)
+        if constexpr (!std::is_same_v<typename L::Element, std::int32_t>)
             kernels.interpolate = &interpolate_rows<L, L, false>;
         else
-            lanes::with_word<Lanes, KnownRescales::halves_up>(ways.input, [&]<class I>() {
+            lanes::with_integer_word<Lanes, KnownRescales::halves_up>(ways.input, [&]<class I>() {
                 kernels.interpolate = plan.volume->largest < 1 << 15 ? &interpolate_rows<L, I, true>
                                                                      : &interpolate_rows<L, I, false>;
             });

@@ -5,6 +5,7 @@
 #define HWY_TARGET_INCLUDE "pipeline/lanes/kernels_shading.cpp"
 #include <hwy/foreach_target.h>
 
+#include "fixedpoint/float_lanes.h"
 #include "fixedpoint/lane_quotients.h"
 #include "fixedpoint/lane_tables.h"
 #include "pipeline/gradient.h"
@@ -21,10 +22,7 @@ struct StoredNeighbourhood {
     const lanes::Batch* pair;
     int place;
     bool below_15_bits;  // every voxel
-    L at(int x, int y, int z) const {
-        const L both = words(x / 2, y, z);
-        return {hn::And(x % 2 ? hn::ShiftRight<16>(both.v) : both.v, constant<L>(0xffff).v)};
-    }
+    L at(int x, int y, int z) const { return half_of(words(x / 2, y, z), x % 2 != 0); }
     L words(int x, int y, int z) const { return load<L>(pair[(z * 4 + y) * 2 + x].v + place); }
 };
 
@@ -118,8 +116,13 @@ void shade_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
 }  // namespace
 
 void shading_kernel_of(const lanes::StageWays& ways, lanes::StageKernels& kernels) {
-    lanes::with_word<Lanes, KnownRescales::halves_to_even>(ways.gradient, [&]<class G>() {
-        lanes::with_word<Lanes, KnownRescales::halves_to_even>(
+    if (ways.gradient.is_float) {
+        using L = Lanes<float, KnownRescales::nothing>;
+        kernels.shade = &shade_samples<L, L>;
+        return;
+    }
+    lanes::with_integer_word<Lanes, KnownRescales::halves_to_even>(ways.gradient, [&]<class G>() {
+        lanes::with_integer_word<Lanes, KnownRescales::halves_to_even>(
             ways.shading, [&]<class L>() { kernels.shade = &shade_samples<G, L>; });
     });
 }

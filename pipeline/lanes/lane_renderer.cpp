@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -46,7 +47,23 @@ KnownRescales known_of(Stage... stage) {
 
 // How far samples may leave the box that is rendered, in voxels: what rounding V adds up to.
 double drift_of(const Plan& plan) {
-    return std::ldexp(static_cast<double>(-plan.location.low[0]), -plan.location.common_fraction);
+    const Index3& n = plan.volume->dims;
+    const double of_floats = plan.float32 ? static_cast<double>(std::max({n.x, n.y, n.z})) * 0x1p-20 : 0;
+    return of_floats + std::ldexp(static_cast<double>(-plan.location.low[0]), -plan.location.common_fraction);
+}
+
+// A word in the buffers: an integer, or a float's bits.
+Word bits_of(std::int64_t word) {
+    return static_cast<Word>(word);
+}
+Word bits_of(Real<float> word) {
+    return std::bit_cast<Word>(word.v);
+}
+void word_from_bits(Word bits, std::int64_t& word) {
+    word = bits;
+}
+void word_from_bits(Word bits, Real<float>& word) {
+    word.v = std::bit_cast<float>(bits);
 }
 
 // Blocks that a slab's two ends may lie apart; 0 where one sample classifies it.
@@ -111,6 +128,12 @@ bool any_active(const PixelPacket& pixels) {
 StageWays ways_of(const Plan& plan) {
     const auto bits = [&](std::size_t stage) { return bits_of(plan.stages[stage].needs); };
     StageWays ways;
+    if (plan.float32) {
+        for (StageWay* way : {&ways.location, &ways.interpolation, &ways.classification, &ways.compositing,
+                              &ways.gradient, &ways.shading, &ways.input})
+            way->is_float = true;
+        return ways;
+    }
     KnownOf location;
     location(plan.location.to_location), location(plan.location.to_weight);
     ways.location = {bits(0), location.known};
@@ -125,13 +148,18 @@ StageWays ways_of(const Plan& plan) {
 }
 
 std::optional<std::string> what_needs_the_model(const Plan& plan) {
-    if (plan.real) return "nothing is rounded";
+    if (plan.real && !plan.float32) return "nothing is rounded";
     if (plan.projection_mode) return "mip, minip and average run in the model";
     if (plan.scene.output.depth || plan.scene.output.normals)
         return "depth and normals are written by the model";
     if (plan.lit && plan.scene.shading.gradient == GradientRule::central_samples)
         return "gradients from samples run in the model";
     if (plan.volume->dims.x < 2) return "the volume is one voxel thick along x";
+    if (plan.float32) {  // formats do not matter
+        if (std::holds_alternative<MomentSeries>(plan.method))
+            return "moments beyond the first have no float32 lanes";
+        return std::nullopt;
+    }
     const auto too_wide = [](std::string_view name, const WordNeeds& needs) -> std::optional<std::string> {
         if (bits_of(needs) != 0) return std::nullopt;
         return fmt::format("{}: factors of {} bits and results of {} fit no lane (32 and 64)", name,
@@ -206,11 +234,18 @@ void LaneRenderer::choose_layout(const RenderOptions& options) {
                           static_cast<double>(all) / 0x1p20, static_cast<double>(cells_->room()) / 0x1p20);
 }
 
-std::string LaneRenderer::why() const {
+std::string words_in_lanes(const Plan& plan) {
+    if (plan.float32) return "float32 lanes";
+    const StageWays ways = ways_of(plan);
     std::string text = fmt::format(
         "lanes of {}/{}/{}/{} bits (location, interpolation, classification, compositing)",
-        ways_.location.bits, ways_.interpolation.bits, ways_.classification.bits, ways_.compositing.bits);
-    if (plan_.lit) text += fmt::format(", gradients {}, shading {}", ways_.gradient.bits, ways_.shading.bits);
+        ways.location.bits, ways.interpolation.bits, ways.classification.bits, ways.compositing.bits);
+    if (plan.lit) text += fmt::format(", gradients {}, shading {}", ways.gradient.bits, ways.shading.bits);
+    return text;
+}
+
+std::string LaneRenderer::why() const {
+    std::string text = words_in_lanes(plan_);
     if (empty_)
         text += fmt::format("; {} of {} blocks visible", empty_->visible_blocks, empty_->distance.size());
     if (no_room_to_skip_) text += "; empty space is visited, for there is no room for its blocks";
@@ -259,10 +294,16 @@ class PacketLoop {
 
   private:
     void start_pixels() {
-        const Accumulated<std::int64_t> none = nothing_yet<std::int64_t>(plan_.compositing);
+        if (plan_.float32)
+            start_pixels_from(nothing_yet<Real<float>>(plan_.compositing));
+        else
+            start_pixels_from(nothing_yet<std::int64_t>(plan_.compositing));
+    }
+    template <class W>
+    void start_pixels_from(const Accumulated<W>& none) {
         for (int r = 0; r < kRays; ++r) {
-            for (std::size_t c = 0; c < 3; ++c) w_.pixels.color[c].v[r] = static_cast<Word>(none.color[c]);
-            w_.pixels.transparency.v[r] = static_cast<Word>(none.transparency);
+            for (std::size_t c = 0; c < 3; ++c) w_.pixels.color[c].v[r] = bits_of(none.color[c]);
+            w_.pixels.transparency.v[r] = bits_of(none.transparency);
             w_.pixels.active.v[r] = w_.rays.slabs.v[r] > 0;
             w_.pixels.samples.v[r] = 0;
         }
@@ -368,6 +409,15 @@ class PacketLoop {
     std::int64_t visited_ = 0;
 };
 
+template <class W>
+Pixel<W> finished(const PixelPacket& pixels, int r) {
+    Pixel<W> pixel;
+    for (std::size_t c = 0; c < 3; ++c) word_from_bits(pixels.color[c].v[r], pixel.gathered.color[c]);
+    word_from_bits(pixels.transparency.v[r], pixel.gathered.transparency);
+    pixel.samples = pixels.samples.v[r];
+    return pixel;
+}
+
 }  // namespace
 
 void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& image,
@@ -382,12 +432,13 @@ void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& 
             loop.run();
             for (int r = 0; r < kRays; ++r) {
                 if (!place.inside(r)) continue;
-                Pixel<std::int64_t> pixel;
-                for (std::size_t c = 0; c < 3; ++c) pixel.gathered.color[c] = w.pixels.color[c].v[r];
-                pixel.gathered.transparency = w.pixels.transparency.v[r];
-                pixel.samples = w.pixels.samples.v[r];
-                store_pixel(plan_, pixel, place.column(r), place.row(r), image);
-                statistics.samples += pixel.samples;
+                if (plan_.float32)
+                    store_pixel(plan_, finished<Real<float>>(w.pixels, r), place.column(r), place.row(r),
+                                image);
+                else
+                    store_pixel(plan_, finished<std::int64_t>(w.pixels, r), place.column(r), place.row(r),
+                                image);
+                statistics.samples += w.pixels.samples.v[r];
             }
             statistics.rays += w.rays.rays, statistics.visited += loop.visited();
         }

@@ -17,6 +17,9 @@ namespace squint::lanes {
 /// What keeps a plan from the lanes, in one line; none when they can run it.
 std::optional<std::string> what_needs_the_model(const Plan& plan);
 
+/// The words of a plan that they can run, in one line.
+std::string words_in_lanes(const Plan& plan);
+
 class LaneRenderer {
   public:
     /// Throws InputError for a target this machine lacks.

@@ -122,9 +122,9 @@ class Searcher {
             const Plan& plan = plans.back();
             if (plan.real)
                 throw InputError(
-                    fmt::format("{}: precision.preset real has no formats; allowed: another "
+                    fmt::format("{}: precision.preset {} has no formats; allowed: another "
                                 "preset, as with --set precision.preset=default",
-                                name_of_scene(i)));
+                                name_of_scene(i), plan.real_name()));
             if (plan.scene.precision.preset != plans[0].scene.precision.preset)
                 throw InputError(
                     fmt::format("{}: preset {}, but {} has {}; allowed: one for all, as with --set "

@@ -272,8 +272,8 @@ std::string Evaluator::identity(const Scene& scene, const std::shared_ptr<const 
     const CompositingForm form = scene.compositing.form;
     hasher.text(std::string(
         name_of(form == CompositingForm::automatic ? preset_form(scene.precision.preset) : form)));
-    if (scene.precision.preset == "real")
-        hasher.text("real");
+    if (rounds_nothing(scene.precision.preset))
+        hasher.text(scene.precision.preset);
     else
         for (const Spec& spec : specs.spec) hasher.text(to_string(spec));
     return hasher.hex();
@@ -484,7 +484,7 @@ Json Evaluator::measure(const Prepared& point, int threads, bool timed) {
     json["cost"] = json_of(cost_of(plan));
     Json& wires = json["wires"] = Json::object();
     for (const Wire wire : used_wires(plan))
-        wires[std::string(info(wire).name)] = plan.real ? "real" : to_string(plan.specs[wire]);
+        wires[std::string(info(wire).name)] = plan.real ? plan.real_name() : to_string(plan.specs[wire]);
     json["volume"] = {{"name", std::filesystem::path(point.volume->name).filename().string()},
                       {"hash", point.volume->content_hash}};
     if (!plan.warnings.empty()) json["warnings"] = plan.warnings;

@@ -66,6 +66,15 @@ TEST_F(Verbs, PlanAsJsonNamesEveryWireWithItsFormat) {
     EXPECT_GT(plan["memory"]["table_bytes"], 0);
 }
 
+TEST_F(Verbs, PlanSaysThatFloat32RunsInLanes) {
+    const auto plan = squint("plan --json --set precision.preset=float32" + kSmall).json();
+    EXPECT_EQ(plan["path"], "lanes");
+    EXPECT_EQ(plan["why"], "float32 lanes");
+    EXPECT_EQ(plan["wires"]["color"]["format"], "float32");
+    EXPECT_THAT(squint("plan --set precision.preset=float32" + kSmall).out,
+                HasSubstr("path: lanes: float32 lanes"));
+}
+
 TEST_F(Verbs, WiresOfThePresetRealHaveNoFormat) {
     for (const char* verb : {"plan --json", "render --json - -q", "pixel 12 8 --json"}) {
         const auto record = squint(verb + kSmall + "--set precision.preset=real").json();

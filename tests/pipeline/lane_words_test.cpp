@@ -6,10 +6,14 @@
 #define HWY_TARGET_INCLUDE "tests/pipeline/lane_words_test.cpp"
 #include <hwy/foreach_target.h>
 
+#include "fixedpoint/float_lanes.h"
 #include "fixedpoint/lane_quotients.h"
 #include "fixedpoint/lane_tables.h"
 #include "fixedpoint/words.h"
+#include "pipeline/classification/entries.h"
 
+#include <bit>
+#include <cstdio>
 #include <random>
 #include <string>
 #include <vector>
@@ -204,11 +208,103 @@ void compare_words(std::vector<std::string>& wrong) {
     }
 }
 
+/// The same of floats, bit for bit: zeros of either sign, and numbers of any magnitude a stage meets.
+class FloatComparison {
+  public:
+    using L = Lanes<float>;
+    static constexpr int kMost = 16;
+
+    explicit FloatComparison(std::vector<std::string>& wrong) : wrong_(wrong) {}
+
+    float any() {
+        const float sizes[] = {0, -0.0F, 1, -1, 0.5F};
+        const auto i = random_() % 24;
+        if (i < 5) return sizes[i];
+        const auto mantissa =
+            static_cast<float>(static_cast<std::int64_t>(random_() % (1U << 25)) - (1 << 24));
+        return std::ldexp(mantissa, static_cast<int>(random_() % 60) - 50);
+    }
+    int between(int low, int high) {
+        return low + static_cast<int>(random_() % static_cast<unsigned>(high - low + 1));
+    }
+
+    template <class Draw, class F>
+    void operator()(const std::string& name, Draw&& draw, F&& f) {
+        std::int32_t in[3][kMost], out[kMost];
+        for (int operand = 0; operand < 3; ++operand)
+            for (std::int32_t& x : in[operand])
+                x = std::bit_cast<std::int32_t>(static_cast<float>(draw(operand)));
+        store(f(load<L>(in[0]), load<L>(in[1]), load<L>(in[2])), out);
+        for (std::size_t i = 0; i < L::count(); ++i) {
+            const auto word = [&](int operand) { return Real<float>{std::bit_cast<float>(in[operand][i])}; };
+            const float expected = f(word(0), word(1), word(2)).v, found = std::bit_cast<float>(out[i]);
+            if (std::bit_cast<std::int32_t>(expected) == out[i] || (expected != expected && found != found))
+                continue;
+            char text[200];
+            std::snprintf(text, sizeof text, "%s(%a, %a, %a): %a, not %a", name.c_str(), double{word(0).v},
+                          double{word(1).v}, double{word(2).v}, double{found}, double{expected});
+            wrong_.push_back(text);
+            return;
+        }
+    }
+
+  private:
+    std::vector<std::string>& wrong_;
+    std::mt19937_64 random_{11};
+};
+
+void compare_float_words(std::vector<std::string>& wrong) {
+    FloatComparison compare(wrong);
+    Table table(200, 4);
+    for (int i = 0; i < 200; ++i)
+        for (int c = 0; c < 4; ++c) table.set_raw(i, c, compare.between(-1 << 30, 1 << 30));
+    table.active = false;
+    table.need_floats();
+    const auto any = [&](int) { return compare.any(); };
+    const auto row = [&](int i) {
+        return static_cast<float>(i == 0 ? compare.between(0, 198) : compare.between(0, 4096));
+    };
+    for (int round = 0; round < 3000 && wrong.size() < 4; ++round) {
+        const int bits = compare.between(-20, 30);
+        Rescale to;
+        to.shift = bits, to.active = false;
+        compare("+ float", any, [](auto x, auto y, auto) { return x + y; });
+        compare("- float", any, [](auto x, auto y, auto) { return x - y; });
+        compare("* float", any, [](auto x, auto y, auto) { return x * y; });
+        compare("/ float", any, [](auto x, auto y, auto) { return x / y; });
+        compare("min float", any, [](auto x, auto y, auto) { return min(x, y); });
+        compare("max float", any, [](auto x, auto y, auto) { return max(x, y); });
+        compare("clamp float", any, [](auto x, auto y, auto z) { return clamp(x, y, z); });
+        compare("absolute float", any, [](auto x, auto, auto) { return absolute(x); });
+        compare("select float", any,
+                [](auto x, auto y, auto z) { return select(((x < y) & !(y == z)) | (z < x), y, z); });
+        compare("square_root", any, [](auto x, auto, auto) { return square_root(absolute(x)); });
+        compare("shift_left float", any, [=](auto x, auto, auto) { return shift_left(x, bits); });
+        compare("floor_shift float", any, [=](auto x, auto, auto) { return floor_shift(x, bits); });
+        compare("blend float", any, [=](auto x, auto y, auto z) { return blend(x, y, z, bits); });
+        compare("affine float", any, [](auto x, auto y, auto z) { return affine(x, y, z, 0, 0); });
+        compare("quantise float", any, [&](auto x, auto, auto) { return quantise(x, to); });
+        compare("quotient float", any, [&](auto x, auto y, auto) { return quotient(x, y, to); });
+        compare("wide float", any,
+                [=](auto x, auto y, auto z) { return wide_sum(x, bits, y) - wide_product(widen(y), z); });
+        compare(
+            "whole_power_of_two", [&](int) { return compare.between(-126, 127); },
+            [](auto x, auto, auto) { return whole_power_of_two(x); });
+        compare("one_minus_exp", any, [](auto x, auto, auto) { return one_minus_exp(absolute(x)); });
+        compare("gather float", row, [&](auto x, auto, auto) { return gather(table, x, 3); });
+        compare("lerp_rows float", row, [&](auto x, auto w, auto) {
+            const auto rows = lerp_rows(table, x, w, 12, to, to);
+            return rows[0] + rows[1] - rows[2] * rows[3];
+        });
+    }
+}
+
 }  // namespace
 
 void compare_all_words(std::vector<std::string>& wrong) {
     compare_words<std::int32_t>(wrong);
     compare_words<std::int64_t>(wrong);
+    compare_float_words(wrong);
 }
 
 }  // namespace squint::HWY_NAMESPACE

@@ -184,7 +184,7 @@ Plan draw_precision(Draw& draw, const std::shared_ptr<const Volume>& volume, Sce
 }
 
 /// A scene and its plan; throws InputError for the few that are refused (a camera looking along its own up).
-Case draw_case(unsigned seed) {
+Case draw_case(unsigned seed, const std::string& preset) {
     Draw draw(seed);
     Scene scene = built_in_scene();
     scene.image.width = scene.image.height = 24;
@@ -207,6 +207,10 @@ Case draw_case(unsigned seed) {
     if (draw.once_in(5)) scene.classification.encoding = AlphaEncoding::sqrt_alpha;
     if (draw.once_in(16)) scene.compositing.mode = draw.any_of<CompositingMode>();
     scene.compositing.form = draw.any_of<CompositingForm>();
+    if (!preset.empty()) {
+        scene.precision.preset = preset;
+        return {scene, make_plan(scene, volume)};
+    }
     Plan plan = draw_precision(draw, volume, scene);
     return {scene, std::move(plan)};
 }
@@ -252,8 +256,9 @@ unsigned from_environment(const char* name, unsigned otherwise) {
     return text ? static_cast<unsigned>(std::strtoul(text, nullptr, 10)) : otherwise;
 }
 
-TEST(SameBits, RandomScenesHaveTheModelsBitsOnEveryPath) {
-    const unsigned scenes = from_environment("SQUINT_SCENES", 300),
+/// `preset`: any for an empty one.
+void compare_random_scenes(unsigned usual_count, const std::string& preset) {
+    const unsigned scenes = from_environment("SQUINT_SCENES", usual_count),
                    first = from_environment("SQUINT_SEED", 1);
     RenderOptions golden;
     golden.threads = 1, golden.path = Path::model;
@@ -263,7 +268,7 @@ TEST(SameBits, RandomScenesHaveTheModelsBitsOnEveryPath) {
         Draw draw(seed + 0x5eed);
         const RenderOptions options = draw_options(draw);
         try {
-            const Case c = draw_case(seed);
+            const Case c = draw_case(seed, preset);
             const Image model = render(c.plan, golden).image;
             const Rendering fast = render(c.plan, options);
             ++drawn;
@@ -285,8 +290,17 @@ TEST(SameBits, RandomScenesHaveTheModelsBitsOnEveryPath) {
     EXPECT_GE(2 * in_lanes, drawn) << "most scenes should run in lanes";
     // The model's own bits, to be compared between compilers and machines.
     std::printf("pictures %s\n", pictures.hex().c_str());
-    RecordProperty("drawn", static_cast<int>(drawn));
-    RecordProperty("in_lanes", static_cast<int>(in_lanes));
+    testing::Test::RecordProperty("drawn", static_cast<int>(drawn));
+    testing::Test::RecordProperty("in_lanes", static_cast<int>(in_lanes));
+}
+
+TEST(SameBits, RandomScenesHaveTheModelsBitsOnEveryPath) {
+    compare_random_scenes(300, "");
+}
+
+// The model of float32 lanes is the scalar float.
+TEST(SameBits, RandomScenesInFloat32HaveTheModelsBitsOnEveryPath) {
+    compare_random_scenes(150, "float32");
 }
 
 }  // namespace
