@@ -5,16 +5,13 @@
 //   vector_length quantise  quotient  blend  affine  within
 //
 // Integer<W>   the model: 64 bits, or 128 where a product needs them
-//
 // Audited      the model, counting what every wire carried
-//
-// Real<T>      no rounding: raw units in floating point, so that shifts are exact multiplications by powers
-//              of two
-//
+// Real<T>      no rounding: raw units in floating point, so that shifts are exact multiplications by powers of two
 // Range        intervals: what a stage's exact results can reach, and so how wide a word it needs
-//              (pipeline/plan.cpp)
+//              (pipeline/plan_words.cpp)
+// Lanes        many samples side by side: lanes.h
 //
-// Lanes        many samples side by side: lanes.h, lane_tables.h, lane_quotients.h, float_lanes.h
+// Wide<W>      beside W, for the few numbers that need more bits than all others: at the end of this file
 #pragma once
 
 #include "fixedpoint/audit.h"
