@@ -91,6 +91,19 @@ void store_pixel(const Plan& plan, const Pixel<Real<float>>& pixel, int column, 
     store(plan, pixel, column, row, image);
 }
 
+Pixel<std::int64_t> project_pixel(const Plan& plan, std::int64_t scalar, std::int64_t slabs) {
+    return with_method(plan, [&](const auto& method) {
+        if (plan.word_bits == 64) return projected<std::int64_t>(plan, method, scalar, slabs);
+        const Pixel<Int128> wide = projected<Int128>(plan, method, scalar, slabs);
+        Pixel<std::int64_t> pixel;
+        for (std::size_t c = 0; c < 3; ++c)
+            pixel.gathered.color[c] = static_cast<std::int64_t>(wide.gathered.color[c]);
+        pixel.gathered.transparency = static_cast<std::int64_t>(wide.gathered.transparency);
+        pixel.samples = wide.samples;
+        return pixel;
+    });
+}
+
 void ModelRenderer::render_tile(int left, int top, int right, int bottom, Image& image,
                                 TileStatistics& statistics) const {
     if (audit_ && !plan_.real) {

@@ -23,6 +23,9 @@ struct Pixel;
 void store_pixel(const Plan& plan, const Pixel<std::int64_t>& pixel, int column, int row, Image& image);
 void store_pixel(const Plan& plan, const Pixel<Real<float>>& pixel, int column, int row, Image& image);
 
+/// MIP, MinIP, average: the pixel of a ray with `slabs` samples, one at least, from their extreme or sum.
+Pixel<std::int64_t> project_pixel(const Plan& plan, std::int64_t scalar, std::int64_t slabs);
+
 class ModelRenderer {
   public:
     explicit ModelRenderer(const Plan& plan, bool audit = false) : plan_(plan), audit_(audit) {}

@@ -234,7 +234,8 @@ ClassificationInputs classification_inputs(const Plan& plan) {
 
 void plan_classification(Plan& plan) {
     plan.method = build_method(classification_inputs(plan));
-    plan.needs_back = std::visit([](const auto& m) { return m.kNeedsBack; }, plan.method);
+    plan.needs_back =
+        !plan.projection_mode && std::visit([](const auto& m) { return m.kNeedsBack; }, plan.method);
     plan.entry_reach = std::visit([](const auto& m) { return entry_reach(m); }, plan.method);
     ClassificationReport report;
     std::visit([&](const auto& m) { m.describe(report); }, plan.method);

@@ -130,12 +130,29 @@ std::array<W, 3> slab_normal(const Plan& plan, const Sample<W>& front, const Sam
     return normalise(plan.gradient, gradient);
 }
 
-/// MIP, MinIP, average: one scalar stands for the ray and is classified at the end.
+/// The end of a projection: what is left of a ray's samples (their extreme, or their sum) is classified as
+/// one.
 template <class W, class M>
-Pixel<W> project_ray(const Plan& plan, const M& method, const RayWords<W>& words, const RaySetup& ray) {
+Pixel<W> projected(const Plan& plan, const M& method, W scalar, std::int64_t slabs) {
     Pixel<W> pixel;
     pixel.gathered = nothing_yet<W>(plan.compositing);
-    if (ray.slabs == 0) return pixel;
+    if (plan.scene.compositing.mode == CompositingMode::average)
+        scalar = quotient(scalar, constant<W>(slabs), plan.to_average);
+    const Slab<W> slab =
+        classify(method, scalar, scalar, constant<W>(std::int64_t{1} << plan.location.length_fraction));
+    composite(plan.compositing, pixel.gathered, slab.color, slab.alpha);
+    pixel.samples = slabs;
+    return pixel;
+}
+
+/// MIP, MinIP, average: one scalar stands for the ray.
+template <class W, class M>
+Pixel<W> project_ray(const Plan& plan, const M& method, const RayWords<W>& words, const RaySetup& ray) {
+    if (ray.slabs == 0) {
+        Pixel<W> pixel;
+        pixel.gathered = nothing_yet<W>(plan.compositing);
+        return pixel;
+    }
     const CompositingMode mode = plan.scene.compositing.mode;
     W scalar = sample_number(plan, words, 0).input;
     for (std::int64_t k = 1; k < ray.slabs; ++k) {
@@ -144,12 +161,7 @@ Pixel<W> project_ray(const Plan& plan, const M& method, const RayWords<W>& words
                  : mode == CompositingMode::minip ? min(scalar, next)
                                                   : scalar + next;
     }
-    if (mode == CompositingMode::average) scalar = quotient(scalar, constant<W>(ray.slabs), plan.to_average);
-    const Slab<W> slab =
-        classify(method, scalar, scalar, constant<W>(std::int64_t{1} << plan.location.length_fraction));
-    composite(plan.compositing, pixel.gathered, slab.color, slab.alpha);
-    pixel.samples = ray.slabs;
-    return pixel;
+    return projected(plan, method, scalar, ray.slabs);
 }
 
 /// Adds slab k to a pixel's depths: its front, seen by the share T lost there.

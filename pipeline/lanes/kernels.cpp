@@ -50,6 +50,7 @@ StageKernels kernels_for(const Plan& plan, const StageWays& ways, const VoxelSou
     classification_kernel(target, plan, ways.classification, kernels);
     shading_kernel(target, ways, kernels);
     compositing_kernel(target, plan, ways.compositing, kernels);
+    projection_kernel(target, plan, kernels);
     return kernels;
 }
 

@@ -50,6 +50,9 @@ struct StageKernels {
     void (*shade)(const Plan&, int count, LitSamples&) = nullptr;
     /// Slabs [0, steps) onto pixels; rays freeze where they end.
     void (*composite)(const Plan&, const RayPacket&, int steps, const Samples&, PixelPacket&) = nullptr;
+    /// Inputs of slabs [0, steps) onto what stands for their rays: in place of classifying and compositing
+    /// them.
+    void (*project)(const RayPacket&, int steps, const Samples&, ProjectionPacket&) = nullptr;
 };
 
 /// How one stage runs: bits of its lanes, 32 or 64, and what its kernel may take for granted; or in floats.
@@ -81,6 +84,7 @@ void voxel_kernels(std::int64_t target, const VoxelSource& source, StageKernels&
 void classification_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);
 void shading_kernel(std::int64_t target, const StageWays& ways, StageKernels& kernels);
 void compositing_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);
+void projection_kernel(std::int64_t target, const Plan& plan, StageKernels& kernels);
 
 /// Calls f with the word for a way; `Known` is what a kernel is compiled to take for granted where it can.
 template <template <class, KnownRescales> class Lanes, KnownRescales Known, class F>

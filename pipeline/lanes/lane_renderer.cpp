@@ -111,6 +111,13 @@ bool may_be_met(const BlockBox& box, const EmptySpace* empty, const Index3& cell
     return false;
 }
 
+// MIP: a block changes a ray where its greatest scalar or any below can be seen.  Else no sample of it is the
+// ray's largest, or the largest is as transparent as whatever stands in its place.
+BlockRanges from_zero(BlockRanges ranges) {
+    std::fill(ranges.smallest.begin(), ranges.smallest.end(), std::uint16_t{0});
+    return ranges;
+}
+
 // What the system could give: pages of mapped files make way.
 std::int64_t free_memory() {
     std::ifstream file("/proc/meminfo");
@@ -149,13 +156,14 @@ StageWays ways_of(const Plan& plan) {
 
 std::optional<std::string> what_needs_the_model(const Plan& plan) {
     if (plan.real && !plan.float32) return "nothing is rounded";
-    if (plan.projection_mode) return "mip, minip and average run in the model";
+    if (plan.float32 && plan.projection_mode) return "mip, minip and average of floats run in the model";
     if (plan.scene.output.depth || plan.scene.output.normals)
         return "depth and normals are written by the model";
     if (plan.lit && plan.scene.shading.gradient == GradientRule::central_samples)
         return "gradients from samples run in the model";
-    if (plan.volume->dims.x < 2) return "the volume is one voxel thick along x";
     if (plan.float32) {  // formats do not matter
+        if (plan.scene.output.depth || plan.scene.output.normals)
+            return "depth and normals of floats are written by the model";
         if (std::holds_alternative<MomentSeries>(plan.method))
             return "moments beyond the first have no float32 lanes";
         return std::nullopt;
@@ -165,9 +173,13 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
         return fmt::format("{}: factors of {} bits and results of {} fit no lane (32 and 64)", name,
                            needs.operand_bits, needs.lane_bits);
     };
-    for (const StageReport& stage : plan.stages)
-        if (const auto obstacle = too_wide(stage.name, stage.needs); stage.modelled && obstacle)
+    for (std::size_t i = 0; i < plan.stages.size(); ++i) {
+        const StageReport& stage = plan.stages[i];
+        const bool once_a_ray = plan.projection_mode && i >= 2;  // in the model's words
+        if (const auto obstacle = too_wide(stage.name, stage.needs);
+            stage.modelled && !once_a_ray && obstacle)
             return obstacle;
+    }
     if (const auto obstacle = too_wide("classification input", plan.input_needs)) return obstacle;
     if (plan.lit && plan.specs[Wire::normal].overflow == Overflow::wrap)
         return "a normal that wraps round is divided by the model";
@@ -198,8 +210,9 @@ void LaneRenderer::find_empty() {
         no_room_to_skip_ = true;
         return;
     }
-    empty_ = find_empty_space(*block_ranges(*plan_.volume, box), plan_.entries, slab_reach(plan_),
-                              plan_.entry_reach);
+    const std::shared_ptr<const BlockRanges> ranges = block_ranges(*plan_.volume, box);
+    empty_ = find_empty_space(plan_.projection_mode ? from_zero(*ranges) : *ranges, plan_.entries,
+                              slab_reach(plan_), plan_.entry_reach);
     room_ -= EmptySpace::bytes_for(empty_->box);
 }
 
@@ -237,6 +250,9 @@ void LaneRenderer::choose_layout(const RenderOptions& options) {
 std::string words_in_lanes(const Plan& plan) {
     if (plan.float32) return "float32 lanes";
     const StageWays ways = ways_of(plan);
+    if (plan.projection_mode)
+        return fmt::format("lanes of {}/{} bits (location, interpolation), one classification a ray",
+                           ways.location.bits, ways.interpolation.bits);
     std::string text = fmt::format(
         "lanes of {}/{}/{}/{} bits (location, interpolation, classification, compositing)",
         ways.location.bits, ways.interpolation.bits, ways.classification.bits, ways.compositing.bits);
@@ -263,6 +279,7 @@ struct Workspace {
     RayPacket rays;
     RayCourse course;
     PixelPacket pixels;
+    ProjectionPacket projection;
     Samples samples[2];  // this batch, and the next one's locations
     LitSamples lit;
 };
@@ -276,7 +293,7 @@ class PacketLoop {
           voxels_(voxels),
           empty_(empty),
           w_(w),
-          backwards_(plan.compositing.form == CompositingForm::back_to_front) {}
+          backwards_(plan.compositing.form == CompositingForm::back_to_front && !plan.projection_mode) {}
 
     /// All slabs of a packet whose rays are set up.
     void run() {
@@ -287,6 +304,21 @@ class PacketLoop {
             run_backwards();
         else
             run_forwards();
+    }
+
+    /// Ray r's pixel.
+    Pixel<std::int64_t> pixel(int r) const {
+        if (plan_.projection_mode && w_.rays.slabs.v[r] > 0)
+            return project_pixel(plan_,
+                                 plan_.scene.compositing.mode == CompositingMode::average
+                                     ? w_.projection.sum[r]
+                                     : w_.projection.extreme.v[r],
+                                 w_.rays.slabs.v[r]);
+        Pixel<std::int64_t> pixel;
+        for (std::size_t c = 0; c < 3; ++c) pixel.gathered.color[c] = w_.pixels.color[c].v[r];
+        pixel.gathered.transparency = w_.pixels.transparency.v[r];
+        pixel.samples = w_.pixels.samples.v[r];
+        return pixel;
     }
 
     /// Slabs of the packet, of all its rays, that went through the stages.
@@ -306,6 +338,10 @@ class PacketLoop {
             w_.pixels.transparency.v[r] = bits_of(none.transparency);
             w_.pixels.active.v[r] = w_.rays.slabs.v[r] > 0;
             w_.pixels.samples.v[r] = 0;
+            // Inputs are not negative.
+            w_.projection.extreme.v[r] =
+                plan_.scene.compositing.mode == CompositingMode::minip ? std::numeric_limits<Word>::max() : 0;
+            w_.projection.sum[r] = 0;
         }
     }
 
@@ -357,10 +393,14 @@ class PacketLoop {
         if (!backwards_) look_ahead(k + kSteps);
         kernels_.fetch(voxels_, from, to, s);
         kernels_.interpolate(plan_, from, to, s);
+        visited_ += steps * w_.rays.rays;
+        if (plan_.projection_mode) {
+            kernels_.project(w_.rays, steps, s, w_.projection);
+            return;
+        }
         kernels_.classify(plan_, steps, s);
         if (plan_.lit) light(steps);
         kernels_.composite(plan_, w_.rays, steps, s, w_.pixels);
-        visited_ += steps * w_.rays.rays;
     }
 
     void locate(Samples& s, int k, int from, int to) {
@@ -432,13 +472,11 @@ void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& 
             loop.run();
             for (int r = 0; r < kRays; ++r) {
                 if (!place.inside(r)) continue;
-                if (plan_.float32)
-                    store_pixel(plan_, finished<Real<float>>(w.pixels, r), place.column(r), place.row(r),
-                                image);
-                else
-                    store_pixel(plan_, finished<std::int64_t>(w.pixels, r), place.column(r), place.row(r),
-                                image);
-                statistics.samples += w.pixels.samples.v[r];
+                const auto store = [&](const auto& pixel) {
+                    store_pixel(plan_, pixel, place.column(r), place.row(r), image);
+                    statistics.samples += pixel.samples;
+                };
+                plan_.float32 ? store(finished<Real<float>>(w.pixels, r)) : store(loop.pixel(r));
             }
             statistics.rays += w.rays.rays, statistics.visited += loop.visited();
         }

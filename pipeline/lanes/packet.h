@@ -81,4 +81,10 @@ struct alignas(64) PixelPacket {
     Row samples;  // slabs composited
 };
 
+/// What stands for sixteen rays in MIP, MinIP and average, so far.
+struct alignas(64) ProjectionPacket {
+    Row extreme;              // the largest or smallest input
+    std::int64_t sum[kRays];  // of inputs
+};
+
 }  // namespace squint::lanes

@@ -61,5 +61,53 @@ TEST(LaneRenderer, KeepsGradientsThatAreWiderThan32Bits) {
     }
 }
 
+/// The model's picture and the lanes', which must take the scene.
+void expect_lanes_to_have_the_models_bits(const std::vector<std::string>& overrides) {
+    const auto text = [&] {
+        std::string all;
+        for (const std::string& o : overrides) all += o + ' ';
+        return all;
+    };
+    RenderOptions options;
+    options.path = Path::model;
+    const std::string expected = picture_hash(rendered(overrides, options).image);
+    options.path = Path::lanes;
+    for (const bool skip : {true, false}) {
+        options.skip = skip;
+        EXPECT_EQ(picture_hash(rendered(overrides, options).image), expected) << text() << skip;
+    }
+}
+
+TEST(LaneRenderer, ProjectsMipMinipAndAverage) {
+    for (const char* mode : {"mip", "minip", "average"})
+        for (const char* method : {"pc", "pc_mid", "pi2d", "pips", "leg"})
+            for (const char* form : {"w", "back_to_front", "unit255_shift"})
+                expect_lanes_to_have_the_models_bits(
+                    {"volume.procedural=shells", "volume.dims=[19, 24, 29]", "image.width=21",
+                     "image.height=18", "output.samples=true", std::string("compositing.mode=") + mode,
+                     std::string("classification.method=") + method,
+                     std::string("compositing.form=") + form});
+}
+
+TEST(LaneRenderer, LeavesOutWhatCannotBeAMaximumThatIsSeen) {
+    const std::vector<std::string> mip{"volume.procedural=shells", "volume.dims=64", "image.width=32",
+                                       "image.height=32", "compositing.mode=mip"};
+    RenderOptions options;
+    options.path = Path::lanes;
+    const Rendering skipped = rendered(mip, options);
+    options.skip = false;
+    const Rendering all = rendered(mip, options);
+    EXPECT_EQ(picture_hash(skipped.image), picture_hash(all.image));
+    EXPECT_LT(skipped.statistics.visited, all.statistics.visited);
+}
+
+TEST(LaneRenderer, TakesVolumesOneVoxelThick) {
+    for (const char* dims : {"[1, 20, 20]", "[20, 1, 20]", "[20, 20, 1]", "[1, 1, 20]", "[1, 1, 1]"})
+        for (const char* shading : {"none", "blinn_phong"})
+            expect_lanes_to_have_the_models_bits({std::string("volume.dims=") + dims, "image.width=20",
+                                                  "image.height=20",
+                                                  std::string("shading.model=") + shading});
+}
+
 }  // namespace
 }  // namespace squint

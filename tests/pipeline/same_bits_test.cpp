@@ -63,8 +63,8 @@ std::shared_ptr<const Volume> draw_volume(Draw& draw, Scene& scene) {
     const auto which =
         static_cast<std::size_t>(draw.between(0, static_cast<std::int64_t>(fields.size()) + 1));
     const ProceduralField& field = which < fields.size() ? fields[which] : noise;
-    const Index3 dims{draw.between(8, 33), draw.between(8, 33),
-                      draw.between(8, 33)};  // braces: in that order
+    Index3 dims{draw.between(8, 33), draw.between(8, 33), draw.between(8, 33)};  // braces: in that order
+    if (draw.once_in(16)) dims[static_cast<int>(draw.between(0, 2))] = 1;
     const int bits = draw.one_of({8, 8, 12, 12, 16, 5});
     const Vec3 spacing = draw.once_in(3) ? Vec3(1, 1, 1) : draw.vector(0.3, 2.5);
     scene.volume.procedural = field.name;  // for the message: `noise` is this file's own
@@ -205,7 +205,7 @@ Case draw_case(unsigned seed, const std::string& preset) {
     method.lookup = draw.any_of<TableLookup>();
     method.opaque_prediction = !draw.once_in(8);
     if (draw.once_in(5)) scene.classification.encoding = AlphaEncoding::sqrt_alpha;
-    if (draw.once_in(16)) scene.compositing.mode = draw.any_of<CompositingMode>();
+    if (draw.once_in(6)) scene.compositing.mode = draw.any_of<CompositingMode>();
     scene.compositing.form = draw.any_of<CompositingForm>();
     if (!preset.empty()) {
         scene.precision.preset = preset;
@@ -213,6 +213,21 @@ Case draw_case(unsigned seed, const std::string& preset) {
     }
     Plan plan = draw_precision(draw, volume, scene);
     return {scene, std::move(plan)};
+}
+
+/// What is not every scene's, and runs in lanes all the same: how often it was drawn, and how often it did.
+struct Share {
+    const char* name;
+    bool (*has)(const Plan& plan);
+    unsigned drawn = 0, in_lanes = 0;
+};
+std::vector<Share> shares() {
+    return {
+        {"mip", [](const Plan& p) { return p.scene.compositing.mode == CompositingMode::mip; }},
+        {"minip", [](const Plan& p) { return p.scene.compositing.mode == CompositingMode::minip; }},
+        {"average", [](const Plan& p) { return p.scene.compositing.mode == CompositingMode::average; }},
+        {"one voxel thick along x", [](const Plan& p) { return p.volume->dims.x == 1; }},
+    };
 }
 
 RenderOptions draw_options(Draw& draw) {
@@ -264,6 +279,7 @@ void compare_random_scenes(unsigned usual_count, const std::string& preset) {
     golden.threads = 1, golden.path = Path::model;
     unsigned drawn = 0, refused = 0, in_lanes = 0, failures = 0;
     Hasher pictures;
+    std::vector<Share> kinds = shares();
     for (unsigned seed = first; seed < first + scenes; ++seed) {
         Draw draw(seed + 0x5eed);
         const RenderOptions options = draw_options(draw);
@@ -274,6 +290,8 @@ void compare_random_scenes(unsigned usual_count, const std::string& preset) {
             ++drawn;
             pictures.text(picture_hash(model));
             in_lanes += fast.statistics.path == "lanes";
+            for (Share& kind : kinds)
+                if (kind.has(c.plan)) ++kind.drawn, kind.in_lanes += fast.statistics.path == "lanes";
             const std::string wrong = first_difference(model, fast.image);
             if (wrong.empty()) continue;
             ADD_FAILURE() << wrong << "\nseed " << seed << ", target " << options.target << ", threads "
@@ -288,6 +306,11 @@ void compare_random_scenes(unsigned usual_count, const std::string& preset) {
     }
     EXPECT_LE(10 * refused, drawn) << "scenes are drawn to be accepted";
     EXPECT_GE(2 * in_lanes, drawn) << "most scenes should run in lanes";
+    if (scenes >= 300)
+        for (const Share& kind : kinds) {
+            EXPECT_GE(kind.drawn, 2u) << kind.name;
+            EXPECT_GE(2 * kind.in_lanes, kind.drawn) << kind.name << ": most should run in lanes";
+        }
     // The model's own bits, to be compared between compilers and machines.
     std::printf("pictures %s\n", pictures.hex().c_str());
     testing::Test::RecordProperty("drawn", static_cast<int>(drawn));
