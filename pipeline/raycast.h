@@ -164,11 +164,11 @@ Pixel<W> project_ray(const Plan& plan, const M& method, const RayWords<W>& words
     return projected(plan, method, scalar, ray.slabs);
 }
 
-/// Adds slab k to a pixel's depths: its front, seen by the share T lost there.
+/// Adds a visible slab k to a pixel's depths: its front, seen by the share T lost there.
 template <class W>
-void note_depth(const Plan& plan, const RaySetup& ray, std::int64_t k, W before, W after, bool backwards,
+void note_depth(const Plan& plan, double entry_distance, std::int64_t k, W before, W after, bool backwards,
                 Pixel<W>& pixel) {
-    const double z = ray.entry_distance + static_cast<double>(k) * plan.step_world;
+    const double z = entry_distance + static_cast<double>(k) * plan.step_world;
     const double t0 = to_double(before), t1 = to_double(after);
     if (backwards) {
         const double clear = t0 > 0 ? t1 / t0 : 1;
@@ -192,6 +192,7 @@ Pixel<W> cast_ray(const Plan& plan, const M& method, const RaySetup& ray, Observ
     const W full_step = constant<W>(std::int64_t{1} << plan.location.length_fraction);
 
     Sample<W> front, back;
+    bool met = false;  // something visible
     for (std::int64_t i = 0; i < ray.slabs; ++i) {
         const std::int64_t k = backwards ? ray.slabs - 1 - i : i;
         observer.slab(k);
@@ -219,15 +220,16 @@ Pixel<W> cast_ray(const Plan& plan, const M& method, const RaySetup& ray, Observ
         if (plan.lit && visible) {
             const std::array<W, 3> normal = slab_normal(plan, front, M::kNeedsBack ? &back : nullptr);
             shade(plan.shading, words, normal, slab.alpha, slab.color);
-            if (!pixel.first_hit || backwards) pixel.first_normal = normal;
+            if (!met || backwards) pixel.first_normal = normal;
         }
+        met = met || visible;
 
         // Stage 6.
         const Accumulated<W> before = pixel.gathered;
         composite(plan.compositing, pixel.gathered, slab.color, slab.alpha);
         ++pixel.samples;
         if (visible && plan.wants_depth)
-            note_depth(plan, ray, k, transparency(plan.compositing, before),
+            note_depth(plan, ray.entry_distance, k, transparency(plan.compositing, before),
                        transparency(plan.compositing, pixel.gathered), backwards, pixel);
         if (!backwards && !goes_on(plan.compositing, pixel.gathered)) break;
     }

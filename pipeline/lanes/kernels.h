@@ -48,8 +48,10 @@ struct StageKernels {
     void (*fetch_lit)(const Plan&, int count, LitSamples&) = nullptr;
     /// Colours of the first `count` gathered samples; reads and writes up to the next multiple of the lanes.
     void (*shade)(const Plan&, int count, LitSamples&) = nullptr;
-    /// Slabs [0, steps) onto pixels; rays freeze where they end.
-    void (*composite)(const Plan&, const RayPacket&, int steps, const Samples&, PixelPacket&) = nullptr;
+    /// Slabs [0, steps) onto pixels; rays freeze where they end.  Where the plan wants depth, `between` takes
+    /// T at the slabs' ends: row s at the front of slab s.
+    void (*composite)(const Plan&, const RayPacket&, int steps, const Samples&, PixelPacket&,
+                      Batch& between) = nullptr;
     /// Inputs of slabs [0, steps) onto what stands for their rays: in place of classifying and compositing
     /// them.
     void (*project)(const RayPacket&, int steps, const Samples&, ProjectionPacket&) = nullptr;

@@ -33,9 +33,9 @@ HWY_INLINE void take_as_plain(CompositingStage& s) {
     if (s.to_contribution.shift <= 0 || s.to_color.shift <= 0) __builtin_unreachable();
 }
 
-template <class L, bool kPlain>
+template <class L, bool kPlain, bool kKeepsT>
 void composite_rows(const Plan& plan, const lanes::RayPacket& packet, int steps,
-                    const lanes::Samples& samples, lanes::PixelPacket& pixels) {
+                    const lanes::Samples& samples, lanes::PixelPacket& pixels, lanes::Batch& between) {
     CompositingStage stage = plan.compositing;
     if constexpr (kPlain) take_as_plain(stage);
     const bool backwards = stage.form == CompositingForm::back_to_front;
@@ -49,9 +49,13 @@ void composite_rows(const Plan& plan, const lanes::RayPacket& packet, int steps,
         const L slabs = load_whole<L>(packet.slabs.v + r);
         auto active = zero < load_whole<L>(pixels.active.v + r);
         L count = load_whole<L>(pixels.samples.v + r);
+        const auto keep_transparency = [&](int row) {
+            if constexpr (kKeepsT) store(pixel.transparency, between.v + row * lanes::kRays + r);
+        };
         for (int i = 0; i < steps; ++i) {
             const int step = backwards ? steps - 1 - i : i;
             const int at = step * lanes::kRays + r;
+            keep_transparency(backwards ? step + 1 : step);
             const auto here = active & (constant<L>(samples.first + step) < slabs);
             const L alpha = load<L>(samples.alpha.v + at);
             const std::array<L, 3> color{load<L>(samples.color[0].v + at), load<L>(samples.color[1].v + at),
@@ -70,6 +74,7 @@ void composite_rows(const Plan& plan, const lanes::RayPacket& packet, int steps,
             }
             if (!backwards) active = here & goes_on(stage, pixel);
         }
+        keep_transparency(backwards ? 0 : steps);
         for_three([&](std::size_t c) SQUINT_WRITTEN_OUT { store(pixel.color[c], pixels.color[c].v + r); });
         store(pixel.transparency, pixels.transparency.v + r);
         store_whole(count, pixels.samples.v + r);
@@ -81,7 +86,9 @@ void composite_rows(const Plan& plan, const lanes::RayPacket& packet, int steps,
 
 void compositing_kernel_of(const Plan& plan, const lanes::StageWay& way, lanes::StageKernels& kernels) {
     lanes::with_word<Lanes, KnownRescales::halves_to_even>(way, [&]<class L>() {
-        kernels.composite = is_plain(plan.compositing) ? &composite_rows<L, true> : &composite_rows<L, false>;
+        kernels.composite = plan.scene.output.depth      ? &composite_rows<L, false, true>
+                            : is_plain(plan.compositing) ? &composite_rows<L, true, false>
+                                                         : &composite_rows<L, false, false>;
     });
 }
 

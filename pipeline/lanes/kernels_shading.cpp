@@ -83,6 +83,7 @@ void shade_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
     const GradientStage stage = plan.gradient;
     const ShadingStage& shading = plan.shading;
     const bool per_ray = shading.half_per_ray || shading.model == ShadingModel::phong;
+    const bool keeps_normals = plan.scene.output.normals;
     constexpr bool kAlike = std::is_same_v<G, L>;
     if constexpr (!kAlike) {
         // To the end of the widest vector, which the second loop reads whole.
@@ -99,6 +100,8 @@ void shade_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
         else
             for (std::size_t a = 0; a < 3; ++a) gradient[a] = load<L>(lit.gradient[a].v + at);
         const std::array<L, 3> normal = normalise(stage, gradient);
+        if (keeps_normals)
+            for (std::size_t a = 0; a < 3; ++a) store(normal[a], lit.normal[a].v + at);
         RayWords<L> ray;
         if (per_ray)
             for (std::size_t a = 0; a < 3; ++a) {

@@ -12,6 +12,7 @@
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <vector>
 
 namespace squint::lanes {
 namespace {
@@ -157,8 +158,6 @@ StageWays ways_of(const Plan& plan) {
 std::optional<std::string> what_needs_the_model(const Plan& plan) {
     if (plan.real && !plan.float32) return "nothing is rounded";
     if (plan.float32 && plan.projection_mode) return "mip, minip and average of floats run in the model";
-    if (plan.scene.output.depth || plan.scene.output.normals)
-        return "depth and normals are written by the model";
     if (plan.lit && plan.scene.shading.gradient == GradientRule::central_samples)
         return "gradients from samples run in the model";
     if (plan.float32) {  // formats do not matter
@@ -183,9 +182,12 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
     if (const auto obstacle = too_wide("classification input", plan.input_needs)) return obstacle;
     if (plan.lit && plan.specs[Wire::normal].overflow == Overflow::wrap)
         return "a normal that wraps round is divided by the model";
-    for (const Wire wire : {Wire::location, Wire::direction, Wire::weight, Wire::length,
-                            Wire::classification_input, Wire::slab_ratio, Wire::slab_color, Wire::slab_alpha,
-                            Wire::lit_color, Wire::color, Wire::transparency, Wire::light}) {
+    std::vector<Wire> stored{
+        Wire::location,     Wire::direction,  Wire::weight,     Wire::length,    Wire::classification_input,
+        Wire::slab_ratio,   Wire::slab_color, Wire::slab_alpha, Wire::lit_color, Wire::color,
+        Wire::transparency, Wire::light};
+    if (plan.lit && plan.scene.output.normals) stored.push_back(Wire::normal);
+    for (const Wire wire : stored) {
         const Format& f = plan.specs[wire].format;
         if (f.integer_bits + f.fraction_bits > 31)
             return fmt::format("{}: {} is wider than a lane's 31 bits and sign", info(wire).name,
@@ -274,6 +276,15 @@ std::int64_t LaneRenderer::bytes() const {
 
 namespace {
 
+// What depth and normals are made of: touched only where a scene asks for them.
+struct Notes {
+    Batch between;                     // T at the ends of a batch's slabs
+    Row samples_before;                // of the batch
+    double entry_distance[kRays];      // world
+    Pixel<std::int64_t> pixel[kRays];  // depths, and the first visible slab's normal
+    bool met[kRays];                   // something lit, and so visible
+};
+
 // One packet's buffers: about 60 KiB, most of it touched only where light falls.
 struct Workspace {
     RayPacket rays;
@@ -282,6 +293,7 @@ struct Workspace {
     ProjectionPacket projection;
     Samples samples[2];  // this batch, and the next one's locations
     LitSamples lit;
+    Notes notes;
 };
 
 class PacketLoop {
@@ -293,12 +305,14 @@ class PacketLoop {
           voxels_(voxels),
           empty_(empty),
           w_(w),
-          backwards_(plan.compositing.form == CompositingForm::back_to_front && !plan.projection_mode) {}
+          backwards_(plan.compositing.form == CompositingForm::back_to_front && !plan.projection_mode),
+          notes_((plan.wants_depth || plan.scene.output.normals) && !plan.projection_mode) {}
 
     /// All slabs of a packet whose rays are set up.
-    void run() {
+    void run(const PacketPlace& place) {
         located_ = -1, visited_ = 0;
         start_pixels();
+        if (notes_) start_notes(place);
         if (empty_) kernels_.set_course(plan_, *empty_, w_.rays, w_.course);
         if (backwards_)
             run_backwards();
@@ -314,7 +328,7 @@ class PacketLoop {
                                      ? w_.projection.sum[r]
                                      : w_.projection.extreme.v[r],
                                  w_.rays.slabs.v[r]);
-        Pixel<std::int64_t> pixel;
+        Pixel<std::int64_t> pixel = notes_ ? w_.notes.pixel[r] : Pixel<std::int64_t>{};
         for (std::size_t c = 0; c < 3; ++c) pixel.gathered.color[c] = w_.pixels.color[c].v[r];
         pixel.gathered.transparency = w_.pixels.transparency.v[r];
         pixel.samples = w_.pixels.samples.v[r];
@@ -325,6 +339,14 @@ class PacketLoop {
     std::int64_t visited() const { return visited_; }
 
   private:
+    void start_notes(const PacketPlace& place) {
+        for (int r = 0; r < kRays; ++r) {
+            w_.notes.pixel[r] = {}, w_.notes.met[r] = false;
+            if (plan_.wants_depth && w_.rays.slabs.v[r] > 0)
+                w_.notes.entry_distance[r] = plan_.set_up(place.column(r), place.row(r)).entry_distance;
+        }
+    }
+
     void start_pixels() {
         if (plan_.float32)
             start_pixels_from(nothing_yet<Real<float>>(plan_.compositing));
@@ -399,8 +421,10 @@ class PacketLoop {
             return;
         }
         kernels_.classify(plan_, steps, s);
-        if (plan_.lit) light(steps);
-        kernels_.composite(plan_, w_.rays, steps, s, w_.pixels);
+        const int lit = plan_.lit ? light(steps) : 0;
+        if (notes_) w_.notes.samples_before = w_.pixels.samples;
+        kernels_.composite(plan_, w_.rays, steps, s, w_.pixels, w_.notes.between);
+        if (notes_) note(lit);
     }
 
     void locate(Samples& s, int k, int from, int to) {
@@ -426,16 +450,47 @@ class PacketLoop {
         for (int a = 0; a < 3; ++a) move(from.cell[a], to.cell[a]), move(from.weight[a], to.weight[a]);
     }
 
-    // Gathers what is visible and not yet hidden, lights it, and puts it back.
-    void light(int steps) {
+    // Gathers what is visible and not yet hidden, lights it, and puts it back.  Gives its number.
+    int light(int steps) {
         Samples& s = here();
         LitSamples& lit = w_.lit;
         const int count = kernels_.gather_lit(plan_, w_.rays, w_.pixels, steps, s, lit);
-        if (count == 0) return;
+        if (count == 0) return 0;
         kernels_.fetch_lit(plan_, count, lit);
         kernels_.shade(plan_, count, lit);
         for (int i = 0; i < count; ++i)
             for (int c = 0; c < 3; ++c) s.color[c].v[lit.from.v[i]] = lit.color[c].v[i];
+        return count;
+    }
+
+    // Depths and first normals of the batch that has just been composited, `lit` samples of it lit.  A ray
+    // took its first slabs, so many as it has more `samples` than before.
+    void note(int lit) {
+        int taken[kRays];
+        for (int r = 0; r < kRays; ++r) taken[r] = w_.pixels.samples.v[r] - w_.notes.samples_before.v[r];
+        for (int r = 0; plan_.wants_depth && r < kRays; ++r) note_depths(r, taken[r]);
+        for (int i = 0; plan_.scene.output.normals && i < lit; ++i) {
+            const int place = backwards_ ? lit - 1 - i : i;  // as the ray meets them
+            const int at = w_.lit.from.v[place], r = at % kRays;
+            if (at / kRays >= taken[r] || (w_.notes.met[r] && !backwards_)) continue;
+            for (std::size_t a = 0; a < 3; ++a) w_.notes.pixel[r].first_normal[a] = w_.lit.normal[a].v[place];
+            w_.notes.met[r] = true;
+        }
+    }
+
+    void note_depths(int r, int taken) {
+        const auto transparency_at = [&](int row) {
+            Accumulated<std::int64_t> there{};
+            there.transparency = w_.notes.between.v[row * kRays + r];
+            return transparency(plan_.compositing, there);
+        };
+        for (int i = 0; i < taken; ++i) {
+            const int row = backwards_ ? taken - 1 - i : i;
+            if (here().alpha.v[row * kRays + r] <= 0) continue;
+            const std::int64_t front = transparency_at(row), back = transparency_at(row + 1);
+            note_depth(plan_, w_.notes.entry_distance[r], here().first + row, backwards_ ? back : front,
+                       backwards_ ? front : back, backwards_, w_.notes.pixel[r]);
+        }
     }
 
     const Plan& plan_;
@@ -444,6 +499,7 @@ class PacketLoop {
     const EmptySpace* empty_;
     Workspace& w_;
     bool backwards_;
+    bool notes_;  // depth or normals are asked for
     int current_ = 0;
     int located_ = -1;  // first slab of the batch whose locations stand in the other buffer
     std::int64_t visited_ = 0;
@@ -469,7 +525,7 @@ void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& 
         for (int x = left; x < right; x += kSide) {
             const PacketPlace place{x, y, right, bottom};
             kernels_.set_up(plan_, place, w.rays);
-            loop.run();
+            loop.run(place);
             for (int r = 0; r < kRays; ++r) {
                 if (!place.inside(r)) continue;
                 const auto store = [&](const auto& pixel) {

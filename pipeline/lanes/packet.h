@@ -71,6 +71,7 @@ struct alignas(64) LitSamples {
     Batch pair[2][32];               // the 4x4x4 voxels about its cell, by pairs along x
     Batch half[kMostHalves][3], view[3];
     Batch gradient[3];  // raw; the sum of a slab's two ends
+    Batch normal[3];    // where it is asked for
     Batch color[3], alpha;
 };
 

@@ -101,6 +101,33 @@ TEST(LaneRenderer, LeavesOutWhatCannotBeAMaximumThatIsSeen) {
     EXPECT_LT(skipped.statistics.visited, all.statistics.visited);
 }
 
+TEST(LaneRenderer, NotesDepthAndTheFirstVisibleSlabsNormal) {
+    for (const char* channel : {"output.depth=true", "output.normals=true"})
+        for (const char* method : {"pc", "pips"})
+            for (const char* form : {"w", "alpha", "back_to_front", "unit255_shift"})
+                expect_lanes_to_have_the_models_bits({"volume.procedural=shells", "volume.dims=[19, 24, 29]",
+                                                      "image.width=21", "image.height=18",
+                                                      "shading.model=blinn_phong", channel,
+                                                      std::string("classification.method=") + method,
+                                                      std::string("compositing.form=") + form});
+}
+
+// What is seen first does not depend on whether its depth is asked for.
+TEST(LaneRenderer, GivesTheSameNormalsWithAndWithoutDepth) {
+    for (const Path path : {Path::model, Path::lanes}) {
+        const std::vector<std::string> scene{
+            "volume.procedural=shells",  "volume.dims=24",     "image.width=24", "image.height=24",
+            "shading.model=blinn_phong", "output.normals=true"};
+        std::vector<std::string> with_depth = scene;
+        with_depth.emplace_back("output.depth=true");
+        RenderOptions options;
+        options.path = path;
+        const Image alone = rendered(scene, options).image, both = rendered(with_depth, options).image;
+        for (const char* name : {"N.x", "N.y", "N.z"})
+            EXPECT_EQ(alone.find(name)->values, both.find(name)->values) << name;
+    }
+}
+
 TEST(LaneRenderer, TakesVolumesOneVoxelThick) {
     for (const char* dims : {"[1, 20, 20]", "[20, 1, 20]", "[20, 20, 1]", "[1, 1, 20]", "[1, 1, 1]"})
         for (const char* shading : {"none", "blinn_phong"})

@@ -189,6 +189,7 @@ Case draw_case(unsigned seed, const std::string& preset) {
     Scene scene = built_in_scene();
     scene.image.width = scene.image.height = 24;
     scene.output.fixed = scene.output.samples = scene.output.transparency = true;
+    scene.output.depth = draw.once_in(3), scene.output.normals = draw.once_in(3);
     const std::shared_ptr<const Volume> volume = draw_volume(draw, scene);
     draw_transfer_function(draw, *volume, scene);
     draw_camera(draw, *volume, scene);
@@ -226,6 +227,8 @@ std::vector<Share> shares() {
         {"mip", [](const Plan& p) { return p.scene.compositing.mode == CompositingMode::mip; }},
         {"minip", [](const Plan& p) { return p.scene.compositing.mode == CompositingMode::minip; }},
         {"average", [](const Plan& p) { return p.scene.compositing.mode == CompositingMode::average; }},
+        {"depth", [](const Plan& p) { return p.scene.output.depth && !p.projection_mode; }},
+        {"normals", [](const Plan& p) { return p.scene.output.normals && p.lit; }},
         {"one voxel thick along x", [](const Plan& p) { return p.volume->dims.x == 1; }},
     };
 }
