@@ -112,6 +112,14 @@ HWY_INLINE W locate(const LocationStage& s, const RayWords<W>& ray, W k, int axi
     return rounded_location(s, ray, exact_location(s, ray, k, axis), k, axis);
 }
 
+/// One voxel on from a location along an axis, ahead or back; held inside the box.
+template <class W>
+HWY_INLINE W beside(const LocationStage& s, W location, int axis, bool ahead) {
+    const W voxel = constant<W>(std::int64_t{1} << s.location_fraction);
+    const W limit = constant<W>(s.limit[static_cast<std::size_t>(axis)]);
+    return ahead ? min(location, limit - voxel) + voxel : max(location, voxel) - voxel;
+}
+
 /// The cell around a location and the weights of its upper corners; at the far face the last cell with a
 /// weight of one.
 template <class W>

@@ -72,6 +72,7 @@ struct Plan {
     RaySetup set_up(int column, int row) const;
     /// The preset whose words these are, where none is quantised.
     std::string real_name() const { return float32 ? "float32" : "real"; }
+    bool gradient_from_samples() const { return lit && gradient.rule == GradientRule::central_samples; }
     Spec spec(Wire wire) const { return specs[wire]; }
 };
 

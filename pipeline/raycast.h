@@ -102,15 +102,14 @@ std::array<W, 3> gradient_at(const Plan& plan, const Sample<W>& sample) {
         const auto a = static_cast<std::size_t>(axis);
         W component;
         if (s.rule == GradientRule::central_samples) {
-            const auto beside = [&](int side) {
+            const auto scalar_beside = [&](bool ahead) {
                 std::array<W, 3> p = sample.location;
-                const W voxel = constant<W>(std::int64_t{side} << plan.location.location_fraction);
-                p[a] = clamp(p[a] + voxel, constant<W>(0), constant<W>(plan.location.limit[a]));
+                p[a] = beside(plan.location, p[a], axis, ahead);
                 const CellPosition<W> position = cell_position(plan.location, p);
                 return interpolate(plan.interpolation, fetch_cell(*plan.volume, position.cell),
                                    position.weight);
             };
-            component = sample_difference(s, beside(1), beside(-1));
+            component = sample_difference(s, scalar_beside(true), scalar_beside(false));
         } else {
             component = voxel_difference(s, near, sample.position.weight, axis);
         }

@@ -46,6 +46,12 @@ struct StageKernels {
                       LitSamples&) = nullptr;
     /// The voxels about the first `count` gathered samples, as many as the gradient's rule wants.
     void (*fetch_lit)(const Plan&, int count, LitSamples&) = nullptr;
+    /// In place of fetch_lit for gradients from samples.  Rows [0, rows) of 16 gathered samples each: one
+    /// voxel on from one end along an axis, their cells and weights.
+    void (*step_aside)(const Plan&, const LitSamples&, int end, int axis, bool ahead, int rows,
+                       Samples&) = nullptr;
+    /// Rows [from, to): corners to scalars, which take the inputs' place.
+    void (*interpolate_scalars)(const Plan&, int from, int to, Samples&) = nullptr;
     /// Colours of the first `count` gathered samples; reads and writes up to the next multiple of the lanes.
     void (*shade)(const Plan&, int count, LitSamples&) = nullptr;
     /// Slabs [0, steps) onto pixels; rays freeze where they end.  Where the plan wants depth, `between` takes

@@ -18,7 +18,7 @@ namespace {
 
 using lanes::kRays;
 
-template <class L>
+template <class L, bool kKeepsLocation>
 void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int to, lanes::Samples& out) {
     const LocationStage stage = plan.location;  // a copy: nothing stored can change it
     const L full = constant<L>(std::int64_t{1} << stage.length_fraction);
@@ -49,9 +49,31 @@ void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int
             for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
                 store_whole(position.cell[a], out.cell[a].v + at);
                 store(position.weight[a], out.weight[a].v + at);
+                if constexpr (kKeepsLocation) store(location[a], out.location[a].v + at);
             });
             store(select(k == last_slab, last_length, full), out.length.v + at);
         }
+    }
+}
+
+template <class L>
+void step_rows_aside(const Plan& plan, const lanes::LitSamples& lit, int end, int axis, bool ahead, int rows,
+                     lanes::Samples& out) {
+    const LocationStage stage = plan.location;
+    for (int at = 0; at < rows * kRays; at += static_cast<int>(L::count())) {
+        std::array<L, 3> location;
+        for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+            // Behind the last sample stands anything.
+            location[a] =
+                clamp(load<L>(lit.location[end][a].v + at), constant<L>(0), constant<L>(stage.limit[a]));
+        });
+        L& moved = location[static_cast<std::size_t>(axis)];
+        moved = beside(stage, moved, axis, ahead);
+        const CellPosition<L> position = cell_position(stage, location);
+        for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+            store_whole(position.cell[a], out.cell[a].v + at);
+            store(position.weight[a], out.weight[a].v + at);
+        });
     }
 }
 
@@ -70,18 +92,31 @@ struct PackedCell {
     }
 };
 
+/// Stage 2 of fetched corners.
+template <class L, bool kBelow15Bits>
+HWY_INLINE L stored_sample(const InterpolationStage& stage, const lanes::Samples& samples, int at) {
+    PackedCell<L, kBelow15Bits> cell;
+    cell.pair = {load<L>(samples.pair[0].v + at), load<L>(samples.pair[1].v + at),
+                 load<L>(samples.pair[2].v + at), load<L>(samples.pair[3].v + at)};
+    const std::array<L, 3> weight{load<L>(samples.weight[0].v + at), load<L>(samples.weight[1].v + at),
+                                  load<L>(samples.weight[2].v + at)};
+    return interpolate(stage, cell, weight);
+}
+
+template <class L, bool kBelow15Bits>
+void interpolate_scalar_rows(const Plan& plan, int from, int to, lanes::Samples& samples) {
+    const InterpolationStage stage = plan.interpolation;
+    for (int at = from * kRays; at < to * kRays; at += static_cast<int>(L::count()))
+        store(stored_sample<L, kBelow15Bits>(stage, samples, at), samples.input.v + at);
+}
+
 /// I: the lanes of the way from a sample to table entries, no narrower than L.
 template <class L, class I, bool kBelow15Bits>
 void interpolate_rows(const Plan& plan, int from, int to, lanes::Samples& samples) {
     const InterpolationStage stage = plan.interpolation;
     const InputStage input = plan.input;
     for (int at = from * kRays; at < to * kRays; at += static_cast<int>(L::count())) {
-        PackedCell<L, kBelow15Bits> cell;
-        cell.pair = {load<L>(samples.pair[0].v + at), load<L>(samples.pair[1].v + at),
-                     load<L>(samples.pair[2].v + at), load<L>(samples.pair[3].v + at)};
-        const std::array<L, 3> weight{load<L>(samples.weight[0].v + at), load<L>(samples.weight[1].v + at),
-                                      load<L>(samples.weight[2].v + at)};
-        const L sample = interpolate(stage, cell, weight);
+        const L sample = stored_sample<L, kBelow15Bits>(stage, samples, at);
         if constexpr (std::is_same_v<typename L::Element, typename I::Element>)
             store(classification_input(input, I{sample.v}), samples.input.v + at);
         else
@@ -95,15 +130,21 @@ void interpolate_rows(const Plan& plan, int from, int to, lanes::Samples& sample
 }  // namespace
 
 void sampling_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::StageKernels& kernels) {
-    lanes::with_word<Lanes, KnownRescales::halves_up>(ways.location,
-                                                      [&]<class L>() { kernels.locate = &locate_rows<L>; });
+    lanes::with_word<Lanes, KnownRescales::halves_up>(ways.location, [&]<class L>() {
+        kernels.locate = plan.gradient_from_samples() ? &locate_rows<L, true> : &locate_rows<L, false>;
+        kernels.step_aside = &step_rows_aside<L>;
+    });
     lanes::with_word<Lanes, KnownRescales::halves_up>(ways.interpolation, [&]<class L>() {
-        if constexpr (!std::is_same_v<typename L::Element, std::int32_t>)
+        constexpr bool kNarrow = std::is_same_v<typename L::Element, std::int32_t>;
+        const bool below_15_bits = plan.volume->largest < 1 << 15;
+        kernels.interpolate_scalars = kNarrow && below_15_bits ? &interpolate_scalar_rows<L, kNarrow>
+                                                               : &interpolate_scalar_rows<L, false>;
+        if constexpr (!kNarrow)
             kernels.interpolate = &interpolate_rows<L, L, false>;
         else
             lanes::with_integer_word<Lanes, KnownRescales::halves_up>(ways.input, [&]<class I>() {
-                kernels.interpolate = plan.volume->largest < 1 << 15 ? &interpolate_rows<L, I, true>
-                                                                     : &interpolate_rows<L, I, false>;
+                kernels.interpolate =
+                    below_15_bits ? &interpolate_rows<L, I, true> : &interpolate_rows<L, I, false>;
             });
     });
 }

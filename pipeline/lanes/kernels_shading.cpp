@@ -55,6 +55,14 @@ HWY_INLINE Lanes<std::int32_t, K> lerped_difference(const GradientStage& s,
 template <class L>
 HWY_INLINE std::array<L, 3> stored_gradient(const Plan& plan, const GradientStage& s,
                                             const lanes::LitSamples& lit, int end, int at) {
+    if (s.rule == GradientRule::central_samples) {
+        const auto between = [&](int axis) SQUINT_WRITTEN_OUT {
+            const auto& scalars = lit.beside[end][axis];
+            const L behind = load<L>(scalars[0].v + at), ahead = load<L>(scalars[1].v + at);
+            return to_world(s, sample_difference(s, ahead, behind), axis);
+        };
+        return {between(0), between(1), between(2)};
+    }
     const StoredNeighbourhood<L> near{lit.pair[end], at, plan.volume->largest < 1 << 15};
     const std::array<L, 3> weight{load<L>(lit.weight[end][0].v + at), load<L>(lit.weight[end][1].v + at),
                                   load<L>(lit.weight[end][2].v + at)};

@@ -137,6 +137,7 @@ int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, const lan
     const hn::ScalableTag<Word> d;
     const auto zero = hn::Zero(d);
     const bool per_ray = plan.shading.half_per_ray || plan.shading.model == ShadingModel::phong;
+    const bool from_samples = plan.gradient_from_samples();
     int count = 0;
     for (int at = 0; at < steps * kRays; at += kLanes) {
         const int r = at % kRays;
@@ -152,6 +153,10 @@ int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, const lan
         hn::StoreU(hn::Compress(hn::Iota(d, at), wanted), d, lit.from.v + count);
         for (int end = 0; end < (plan.needs_back ? 2 : 1); ++end)
             for (int a = 0; a < 3; ++a) {
+                if (from_samples) {
+                    pack(s.location[a].v + at + end * kRays, lit.location[end][a]);
+                    continue;
+                }
                 pack(s.cell[a].v + at + end * kRays, lit.cell[end][a]);
                 pack(s.weight[a].v + at + end * kRays, lit.weight[end][a]);
             }

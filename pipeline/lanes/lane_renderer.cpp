@@ -157,12 +157,11 @@ StageWays ways_of(const Plan& plan) {
 
 std::optional<std::string> what_needs_the_model(const Plan& plan) {
     if (plan.real && !plan.float32) return "nothing is rounded";
-    if (plan.float32 && plan.projection_mode) return "mip, minip and average of floats run in the model";
-    if (plan.lit && plan.scene.shading.gradient == GradientRule::central_samples)
-        return "gradients from samples run in the model";
     if (plan.float32) {  // formats do not matter
+        if (plan.projection_mode) return "mip, minip and average of floats run in the model";
         if (plan.scene.output.depth || plan.scene.output.normals)
             return "depth and normals of floats are written by the model";
+        if (plan.gradient_from_samples()) return "gradients from samples of floats run in the model";
         if (std::holds_alternative<MomentSeries>(plan.method))
             return "moments beyond the first have no float32 lanes";
         return std::nullopt;
@@ -187,6 +186,7 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
         Wire::slab_ratio,   Wire::slab_color, Wire::slab_alpha, Wire::lit_color, Wire::color,
         Wire::transparency, Wire::light};
     if (plan.lit && plan.scene.output.normals) stored.push_back(Wire::normal);
+    if (plan.gradient_from_samples()) stored.push_back(Wire::sample);
     for (const Wire wire : stored) {
         const Format& f = plan.specs[wire].format;
         if (f.integer_bits + f.fraction_bits > 31)
@@ -293,6 +293,7 @@ struct Workspace {
     ProjectionPacket projection;
     Samples samples[2];  // this batch, and the next one's locations
     LitSamples lit;
+    Samples beside;  // those that a gradient is made of
     Notes notes;
 };
 
@@ -442,12 +443,13 @@ class PacketLoop {
     }
 
     // One batch's last row becomes the next one's first.
-    static void carry(const Samples& from, Samples& to) {
+    void carry(const Samples& from, Samples& to) const {
         const auto move = [](const Batch& a, Batch& b) {
             std::memmove(b.v, a.v + kSteps * kRays, sizeof(Word) * kRays);
         };
         move(from.input, to.input), move(from.length, to.length);
         for (int a = 0; a < 3; ++a) move(from.cell[a], to.cell[a]), move(from.weight[a], to.weight[a]);
+        for (int a = 0; plan_.gradient_from_samples() && a < 3; ++a) move(from.location[a], to.location[a]);
     }
 
     // Gathers what is visible and not yet hidden, lights it, and puts it back.  Gives its number.
@@ -456,11 +458,28 @@ class PacketLoop {
         LitSamples& lit = w_.lit;
         const int count = kernels_.gather_lit(plan_, w_.rays, w_.pixels, steps, s, lit);
         if (count == 0) return 0;
-        kernels_.fetch_lit(plan_, count, lit);
+        if (plan_.gradient_from_samples())
+            sample_beside(count);
+        else
+            kernels_.fetch_lit(plan_, count, lit);
         kernels_.shade(plan_, count, lit);
         for (int i = 0; i < count; ++i)
             for (int c = 0; c < 3; ++c) s.color[c].v[lit.from.v[i]] = lit.color[c].v[i];
         return count;
+    }
+
+    // The six samples about each of the first `count` gathered ones, or about either of its ends.
+    void sample_beside(int count) {
+        const int rows = (count + kRays - 1) / kRays;
+        for (int end = 0; end < (plan_.needs_back ? 2 : 1); ++end)
+            for (int axis = 0; axis < 3; ++axis)
+                for (const bool ahead : {false, true}) {
+                    kernels_.step_aside(plan_, w_.lit, end, axis, ahead, rows, w_.beside);
+                    kernels_.prefetch(voxels_, 0, rows, w_.beside);
+                    kernels_.fetch(voxels_, 0, rows, w_.beside);
+                    kernels_.interpolate_scalars(plan_, 0, rows, w_.beside);
+                    std::copy_n(w_.beside.input.v, rows * kRays, w_.lit.beside[end][axis][ahead].v);
+                }
     }
 
     // Depths and first normals of the batch that has just been composited, `lit` samples of it lit.  A ray

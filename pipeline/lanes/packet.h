@@ -57,6 +57,7 @@ struct alignas(64) RayCourse {
 struct alignas(64) Samples {
     Word first = 0;
     Batch cell[3], weight[3];
+    Batch location[3];      // where gradients are made of samples
     Batch place;            // of the cell among the cells in memory, or below 0 (see VoxelSource)
     Batch pair[4];          // corners by pairs along x: the lower in the low half; y fastest
     Batch input;            // classification input
@@ -69,6 +70,8 @@ struct alignas(64) LitSamples {
     Batch from;                      // place in the batch
     Batch cell[2][3], weight[2][3];  // of the front sample, and of the back one where a slab has two
     Batch pair[2][32];               // the 4x4x4 voxels about its cell, by pairs along x
+    Batch location[2][3];            // in place of cell and weight, of a gradient from samples
+    Batch beside[2][3][2];           // scalars one voxel off along each axis: behind, ahead
     Batch half[kMostHalves][3], view[3];
     Batch gradient[3];  // raw; the sum of a slab's two ends
     Batch normal[3];    // where it is asked for

@@ -128,6 +128,18 @@ TEST(LaneRenderer, GivesTheSameNormalsWithAndWithoutDepth) {
     }
 }
 
+TEST(LaneRenderer, MakesGradientsOfSamples) {
+    for (const char* dims : {"[19, 24, 29]", "[19, 1, 23]", "[1, 21, 22]"})
+        for (const char* method : {"pc", "pips"})
+            for (const char* wire :
+                 {"precision.weight=u1.7", "precision.location=u6.24", "precision.sample=u8.20"})
+                expect_lanes_to_have_the_models_bits(
+                    {"volume.procedural=shells", std::string("volume.dims=") + dims, "volume.bits=8",
+                     "volume.spacing=[1, 1.3, 0.8]", "image.width=21", "image.height=18",
+                     "shading.model=blinn_phong", "shading.gradient=central_samples",
+                     std::string("classification.method=") + method, wire});
+}
+
 TEST(LaneRenderer, TakesVolumesOneVoxelThick) {
     for (const char* dims : {"[1, 20, 20]", "[20, 1, 20]", "[20, 20, 1]", "[1, 1, 20]", "[1, 1, 1]"})
         for (const char* shading : {"none", "blinn_phong"})

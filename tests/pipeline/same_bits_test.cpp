@@ -229,6 +229,7 @@ std::vector<Share> shares() {
         {"average", [](const Plan& p) { return p.scene.compositing.mode == CompositingMode::average; }},
         {"depth", [](const Plan& p) { return p.scene.output.depth && !p.projection_mode; }},
         {"normals", [](const Plan& p) { return p.scene.output.normals && p.lit; }},
+        {"gradients from samples", [](const Plan& p) { return p.gradient_from_samples(); }},
         {"one voxel thick along x", [](const Plan& p) { return p.volume->dims.x == 1; }},
     };
 }
