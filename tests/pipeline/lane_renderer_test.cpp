@@ -80,7 +80,7 @@ void expect_lanes_to_have_the_models_bits(const std::vector<std::string>& overri
 
 TEST(LaneRenderer, ProjectsMipMinipAndAverage) {
     for (const char* mode : {"mip", "minip", "average"})
-        for (const char* method : {"pc", "pc_mid", "pi2d", "pips", "leg"})
+        for (const char* method : {"pc", "pc_mid", "pi2d", "pips", "pi1d"})
             for (const char* form : {"w", "back_to_front", "unit255_shift"})
                 expect_lanes_to_have_the_models_bits(
                     {"volume.procedural=shells", "volume.dims=[19, 24, 29]", "image.width=21",
