@@ -280,7 +280,6 @@ namespace {
 struct Notes {
     Batch between;                     // T at the ends of a batch's slabs
     Row samples_before;                // of the batch
-    double entry_distance[kRays];      // world
     Pixel<std::int64_t> pixel[kRays];  // depths, and the first visible slab's normal
     bool met[kRays];                   // something lit, and so visible
 };
@@ -310,10 +309,12 @@ class PacketLoop {
           notes_((plan.wants_depth || plan.scene.output.normals) && !plan.projection_mode) {}
 
     /// All slabs of a packet whose rays are set up.
-    void run(const PacketPlace& place) {
+    void run() {
         located_ = -1, visited_ = 0;
         start_pixels();
-        if (notes_) start_notes(place);
+        if (notes_)
+            std::fill_n(w_.notes.pixel, kRays, Pixel<std::int64_t>{}),
+                std::fill_n(w_.notes.met, kRays, false);
         if (empty_) kernels_.set_course(plan_, *empty_, w_.rays, w_.course);
         if (backwards_)
             run_backwards();
@@ -340,14 +341,6 @@ class PacketLoop {
     std::int64_t visited() const { return visited_; }
 
   private:
-    void start_notes(const PacketPlace& place) {
-        for (int r = 0; r < kRays; ++r) {
-            w_.notes.pixel[r] = {}, w_.notes.met[r] = false;
-            if (plan_.wants_depth && w_.rays.slabs.v[r] > 0)
-                w_.notes.entry_distance[r] = plan_.set_up(place.column(r), place.row(r)).entry_distance;
-        }
-    }
-
     void start_pixels() {
         if (plan_.float32)
             start_pixels_from(nothing_yet<Real<float>>(plan_.compositing));
@@ -507,7 +500,7 @@ class PacketLoop {
             const int row = backwards_ ? taken - 1 - i : i;
             if (here().alpha.v[row * kRays + r] <= 0) continue;
             const std::int64_t front = transparency_at(row), back = transparency_at(row + 1);
-            note_depth(plan_, w_.notes.entry_distance[r], here().first + row, backwards_ ? back : front,
+            note_depth(plan_, w_.rays.entry_distance[r], here().first + row, backwards_ ? back : front,
                        backwards_ ? front : back, backwards_, w_.notes.pixel[r]);
         }
     }
@@ -544,7 +537,7 @@ void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& 
         for (int x = left; x < right; x += kSide) {
             const PacketPlace place{x, y, right, bottom};
             kernels_.set_up(plan_, place, w.rays);
-            loop.run(place);
+            loop.run();
             for (int r = 0; r < kRays; ++r) {
                 if (!place.inside(r)) continue;
                 const auto store = [&](const auto& pixel) {
