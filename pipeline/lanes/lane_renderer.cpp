@@ -213,8 +213,10 @@ void LaneRenderer::find_empty() {
         return;
     }
     const std::shared_ptr<const BlockRanges> ranges = block_ranges(*plan_.volume, box);
-    empty_ = find_empty_space(plan_.projection_mode ? from_zero(*ranges) : *ranges, plan_.entries,
-                              slab_reach(plan_), plan_.entry_reach);
+    const auto find = [&](const BlockRanges& r) {
+        return find_empty_space(r, plan_.entries, slab_reach(plan_), plan_.entry_reach);
+    };
+    empty_ = plan_.projection_mode ? find(from_zero(*ranges)) : find(*ranges);
     room_ -= EmptySpace::bytes_for(empty_->box);
 }
 
