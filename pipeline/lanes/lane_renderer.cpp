@@ -298,6 +298,15 @@ struct Workspace {
     Notes notes;
 };
 
+/// Ray r's pixel, with what has been noted of it.
+template <class W>
+Pixel<W> finished(const PixelPacket& pixels, int r, Pixel<W> pixel = {}) {
+    for (std::size_t c = 0; c < 3; ++c) word_from_bits(pixels.color[c].v[r], pixel.gathered.color[c]);
+    word_from_bits(pixels.transparency.v[r], pixel.gathered.transparency);
+    pixel.samples = pixels.samples.v[r];
+    return pixel;
+}
+
 class PacketLoop {
   public:
     PacketLoop(const Plan& plan, const StageKernels& kernels, const VoxelSource& voxels,
@@ -332,11 +341,7 @@ class PacketLoop {
                                      ? w_.projection.sum[r]
                                      : w_.projection.extreme.v[r],
                                  w_.rays.slabs.v[r]);
-        Pixel<std::int64_t> pixel = notes_ ? w_.notes.pixel[r] : Pixel<std::int64_t>{};
-        for (std::size_t c = 0; c < 3; ++c) pixel.gathered.color[c] = w_.pixels.color[c].v[r];
-        pixel.gathered.transparency = w_.pixels.transparency.v[r];
-        pixel.samples = w_.pixels.samples.v[r];
-        return pixel;
+        return finished<std::int64_t>(w_.pixels, r, notes_ ? w_.notes.pixel[r] : Pixel<std::int64_t>{});
     }
 
     /// Slabs of the packet, of all its rays, that went through the stages.
@@ -518,15 +523,6 @@ class PacketLoop {
     int located_ = -1;  // first slab of the batch whose locations stand in the other buffer
     std::int64_t visited_ = 0;
 };
-
-template <class W>
-Pixel<W> finished(const PixelPacket& pixels, int r) {
-    Pixel<W> pixel;
-    for (std::size_t c = 0; c < 3; ++c) word_from_bits(pixels.color[c].v[r], pixel.gathered.color[c]);
-    word_from_bits(pixels.transparency.v[r], pixel.gathered.transparency);
-    pixel.samples = pixels.samples.v[r];
-    return pixel;
-}
 
 }  // namespace
 
