@@ -215,9 +215,10 @@ TEST(ClassificationMethods, TablesHaveTheSameWordsWithAndWithoutTheirExactValues
 
 TEST(ClassificationMethods, AnOrderThatIsNotGivenIsTheLeastOfItsMethod) {
     const auto hash_of = [](const std::string& method, const std::string& order) {
-        const Scene scene = scene_with(built_in_scene(),
-                                       {"volume.dims=12", "image.width=16", "image.height=16",
-                                        "classification.method=" + method, "classification.order=" + order});
+        const Scene scene = scene_with(
+            built_in_scene(),
+            {"volume.dims=24", "camera.height=28", "sampling.step=4", "image.width=16", "image.height=16",
+             "classification.method=" + method, "classification.order=" + order});
         const auto volume = std::make_shared<const Volume>(load_volume(volume_source(scene)));
         return picture_hash(render(make_plan(scene, volume)).image);
     };

@@ -309,8 +309,10 @@ void compare_random_scenes(unsigned usual_count, const std::string& preset) {
         }
     }
     EXPECT_LE(10 * refused, drawn) << "scenes are drawn to be accepted";
-    EXPECT_GE(2 * in_lanes, drawn) << "most scenes should run in lanes";
-    if (scenes >= 300)
+    // Floats have no lanes for projections, depth, normals, gradients from samples and higher moments.
+    const bool floats = preset == "float32";
+    EXPECT_GE((floats ? 3 : 2) * in_lanes, drawn) << "most scenes should run in lanes";
+    if (scenes >= 300 && !floats)
         for (const Share& kind : kinds) {
             EXPECT_GE(kind.drawn, 2u) << kind.name;
             EXPECT_GE(2 * kind.in_lanes, kind.drawn) << kind.name << ": most should run in lanes";
