@@ -109,6 +109,12 @@ class PacketLoop {
             start_pixels_from(nothing_yet<Real<float>>(plan_.compositing));
         else
             start_pixels_from(nothing_yet<std::int64_t>(plan_.compositing));
+        for (int r = 0; plan_.projection_mode && r < kRays; ++r) {
+            // Inputs are not negative.
+            w_.projection.extreme.v[r] =
+                plan_.scene.compositing.mode == CompositingMode::minip ? std::numeric_limits<Word>::max() : 0;
+            w_.projection.sum[r] = 0;
+        }
     }
     template <class W>
     void start_pixels_from(const Accumulated<W>& none) {
@@ -117,10 +123,6 @@ class PacketLoop {
             w_.pixels.transparency.v[r] = bits_of(none.transparency);
             w_.pixels.active.v[r] = w_.rays.slabs.v[r] > 0;
             w_.pixels.samples.v[r] = 0;
-            // Inputs are not negative.
-            w_.projection.extreme.v[r] =
-                plan_.scene.compositing.mode == CompositingMode::minip ? std::numeric_limits<Word>::max() : 0;
-            w_.projection.sum[r] = 0;
         }
     }
 

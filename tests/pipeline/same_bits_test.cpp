@@ -210,6 +210,12 @@ Case draw_case(unsigned seed, const std::string& preset) {
     scene.compositing.form = draw.any_of<CompositingForm>();
     if (!preset.empty()) {
         scene.precision.preset = preset;
+        if (!draw.once_in(4)) {  // what floats have lanes for
+            scene.output.depth = scene.output.normals = false;
+            scene.compositing.mode = CompositingMode::over;
+            if (scene.shading.gradient == GradientRule::central_samples)
+                scene.shading.gradient = GradientRule::central;
+        }
         return {scene, make_plan(scene, volume)};
     }
     Plan plan = draw_precision(draw, volume, scene);
@@ -309,10 +315,8 @@ void compare_random_scenes(unsigned usual_count, const std::string& preset) {
         }
     }
     EXPECT_LE(10 * refused, drawn) << "scenes are drawn to be accepted";
-    // Floats have no lanes for projections, depth, normals, gradients from samples and higher moments.
-    const bool floats = preset == "float32";
-    EXPECT_GE((floats ? 5 : 2) * in_lanes, drawn) << "enough scenes should run in lanes";
-    if (scenes >= 300 && !floats)
+    EXPECT_GE(2 * in_lanes, drawn) << "most scenes should run in lanes";
+    if (scenes >= 300 && preset.empty())
         for (const Share& kind : kinds) {
             EXPECT_GE(kind.drawn, 2u) << kind.name;
             EXPECT_GE(2 * kind.in_lanes, kind.drawn) << kind.name << ": most should run in lanes";
