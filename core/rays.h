@@ -12,7 +12,9 @@
 #include <hwy/highway.h>
 
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 HWY_BEFORE_NAMESPACE();
@@ -78,6 +80,20 @@ HWY_INLINE Reals square_root(Reals x) {
 }
 HWY_INLINE Reals ceiling(Reals x) {
     return Reals(hwy::HWY_NAMESPACE::Ceil(x.v));
+}
+
+/// What many numbers are divided by.  By a power of two that is a multiplication, with the same result.
+struct Divisor {
+    double divisor, inverse;
+    bool is_power_of_two;
+    HWY_INLINE explicit Divisor(double x)
+        : divisor(x),
+          inverse(1 / x),
+          is_power_of_two(std::bit_cast<std::uint64_t>(x) << 12 == 0 && 0x1p-1000 < x && x < 0x1p1000) {}
+};
+template <class D>
+HWY_INLINE D operator/(D x, const Divisor& by) {
+    return by.is_power_of_two ? x * D(by.inverse) : x / D(by.divisor);
 }
 
 /// The first of two that are equal, so that zeros of either sign come out alike from every word.

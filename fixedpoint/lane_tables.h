@@ -164,24 +164,33 @@ HWY_INLINE std::array<std::array<Lanes<std::int32_t, K>, 4>, 2> load_two_rows(co
     const auto b = load_quads([&](int lane) { return rows + std::int64_t{4} * at[lane] + 4; });
     return {{{L{a[0]}, L{a[1]}, L{a[2]}, L{a[3]}}, {L{b[0]}, L{b[1]}, L{b[2]}, L{b[3]}}}};
 }
+/// lerp_rows of rows that are paired (Table::paired), their weights of 14 bits at most.
+template <KnownRescales K>
+HWY_INLINE std::array<Lanes<std::int32_t, K>, 4> lerp_paired_rows(const std::int32_t* paired,
+                                                                  Lanes<std::int32_t, K> row,
+                                                                  Lanes<std::int32_t, K> weight,
+                                                                  int weight_bits, const Rescale& to_color,
+                                                                  const Rescale& to_alpha) {
+    const hn::ScalableTag<std::int32_t> d;
+    alignas(64) std::int32_t at[HWY_LANES(std::int32_t)];  // bytes
+    hn::Store(hn::ShiftLeft<4>(row.v), d, at);
+    const auto* bytes = reinterpret_cast<const std::uint8_t*>(paired);
+    const auto pairs = load_quads([&](int lane) { return bytes + at[lane]; });
+    const auto weights = pair_weights(weight.v, weight_bits);
+    const std::int32_t offset = 1 << (weight_bits + 15);
+    return {blend_pairs<K>(pairs[0], weights, offset, to_color),
+            blend_pairs<K>(pairs[1], weights, offset, to_color),
+            blend_pairs<K>(pairs[2], weights, offset, to_color),
+            blend_pairs<K>(pairs[3], weights, offset, to_alpha)};
+}
 template <class T, KnownRescales K>
 HWY_INLINE std::array<Lanes<T, K>, 4> lerp_rows(const Table& table, Lanes<T, K> row, Lanes<T, K> weight,
                                                 int weight_bits, const Rescale& to_color,
                                                 const Rescale& to_alpha) {
     using L = Lanes<T, K>;
     if constexpr (sizeof(T) == 4)
-        if (const std::int32_t* paired = table.paired(); paired && weight_bits <= 14) {
-            const hn::ScalableTag<T> d;
-            alignas(64) T at[HWY_LANES(T)];
-            hn::Store(row.v, d, at);
-            const auto pairs = load_quads([&](int lane) { return paired + std::int64_t{4} * at[lane]; });
-            const auto weights = pair_weights(weight.v, weight_bits);
-            const std::int32_t offset = 1 << (weight_bits + 15);
-            return {blend_pairs<K>(pairs[0], weights, offset, to_color),
-                    blend_pairs<K>(pairs[1], weights, offset, to_color),
-                    blend_pairs<K>(pairs[2], weights, offset, to_color),
-                    blend_pairs<K>(pairs[3], weights, offset, to_alpha)};
-        }
+        if (const std::int32_t* paired = table.paired(); paired && weight_bits <= 14)
+            return lerp_paired_rows(paired, row, weight, weight_bits, to_color, to_alpha);
     const L next = row + make_word(WordTag<L>{}, 1);
     const auto between = [&](int c) {
         return quantise(blend(gather(table, row, c), gather(table, next, c), weight, weight_bits),

@@ -166,7 +166,7 @@ HWY_INLINE Lanes<T, K> quantise(Lanes<T, K> x, const Rescale& to) {
     const hn::ScalableTag<T> d;
     const auto biased = [&] { return hn::Add(x.v, hn::Set(d, static_cast<T>(to.bias))); };
     if constexpr (K == KnownRescales::halves_up) return {shift_right_same(biased(), to.shift)};
-    if constexpr (K == KnownRescales::halves_to_even) {
+    if constexpr (K == KnownRescales::halves_to_even || K == KnownRescales::unit_products) {
         if (to.shift > 0) {
 #if HWY_TARGET <= HWY_AVX3
             // Halves up; what was a half loses the last bit: one instruction less where masks are cheap.
@@ -202,6 +202,32 @@ HWY_INLINE Lanes<T, K> quantise(Lanes<T, K> x, const Rescale& to) {
     if (unused <= 0) return x;
     if (to.is_signed) return floor_shift(shift_left(x, unused), unused);
     return {hn::And(x.v, hn::Set(d, static_cast<T>((std::int64_t{1} << to.width) - 1)))};
+}
+
+/// words.h's.
+template <class T, KnownRescales K>
+HWY_INLINE Lanes<T, K> quantised_product(Lanes<T, K> a, Lanes<T, K> b, const Rescale& to) {
+    return quantise(a * b, to);
+}
+/// Of numbers from 0 to 1: in 16 bits, where both stand below zero, for -1 is there and 1 is not.
+template <KnownRescales K>
+requires(K == KnownRescales::unit_products) HWY_INLINE Lanes<std::int32_t, K> quantised_product(
+    Lanes<std::int32_t, K> a, Lanes<std::int32_t, K> b, const Rescale& to) {
+#if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR
+    (void)to;
+    const hn::ScalableTag<std::int32_t> d;
+    const hn::ScalableTag<std::int16_t> d16;
+    const auto narrow = [&](auto v) HWY_ATTR { return hn::BitCast(d16, v); };
+    const auto below = [&](auto v) HWY_ATTR { return hn::Sub(hn::Zero(d16), narrow(v)); };
+    // Halves up, and 1 comes out as -2^15: the upper half of each word stays zero.
+    const auto up = hn::BitCast(d, hn::MulFixedPoint15(below(a.v), below(b.v)));
+    // What was a half loses the last bit.
+    const auto lost = hn::And(hn::BitCast(d, hn::Mul(narrow(a.v), narrow(b.v))), hn::Set(d, 0x7fff));
+    const auto half = hn::Eq(lost, hn::Set(d, 0x4000));
+    return {hn::IfThenElse(half, hn::AndNot(hn::Set(d, 1), up), up)};
+#else
+    return quantise(a * b, to);
+#endif
 }
 
 // ------------------------------------------------------------------------------------------------ memory:

@@ -58,6 +58,9 @@ enum class KnownRescales {
     nothing,
     halves_to_even,  // bits are dropped, at most; floor, halves up or to even; limits saturate
     halves_up,       // as above without halves to even, and without limits
+    // Of no order: said where a plan has proven it.  Halves to even, and products are those of two numbers
+    // from 0 to 1 of 15 fraction bits, of which 15 are kept, without limits.
+    unit_products,
 };
 inline bool holds(KnownRescales known, const Rescale& to, int lane_bits) {
     // A wire nothing flows through, or one that quantise() does not meet.

@@ -6,8 +6,8 @@
 //
 // Integer<W>   the model: 64 bits, or 128 where a product needs them
 // Audited      the model, counting what every wire carried
-// Real<T>      no rounding: raw units in floating point, so that shifts are exact multiplications by powers of two
-// Range        intervals: what a stage's exact results can reach, and so how wide a word it needs
+// Real<T>      no rounding: raw units in floating point, so that shifts are exact multiplications by powers
+// of two Range        intervals: what a stage's exact results can reach, and so how wide a word it needs
 //              (pipeline/plan_words.cpp)
 // Lanes        many samples side by side: lanes.h
 //
@@ -473,6 +473,12 @@ std::array<W, 4> lerp_rows(const Table& table, W row, W weight, int weight_bits,
             blend(gather(table, row, c), gather(table, row + constant<W>(1), c), weight, weight_bits),
             c < 3 ? to_color : to_alpha);
     return between;
+}
+
+/// a b, exact, then quantised once.
+template <class W>
+constexpr W quantised_product(W a, W b, const Rescale& to) {
+    return quantise(a * b, to);
 }
 
 template <class W>

@@ -20,6 +20,8 @@ struct CompositingStage {
     CompositingForm form = CompositingForm::w;
     bool premultiplied = false;  // the slab's colour is
     int alpha_fraction = 0, color_fraction = 0, contribution_fraction = 0, transparency_fraction = 0;
+    int sum_fraction = 0;                       // of C
+    bool of_units = false;                      // slabs' colours and opacities lie in 0 to 1: proven
     Rescale to_contribution;                    // alpha T
     Rescale to_transparency;                    // T - w, T (1 - alpha), or (1 - A) alpha
     Rescale to_color;                           // a product on its way into C
@@ -39,6 +41,7 @@ struct CompositingStage {
         return form == CompositingForm::unit255_shift || form == CompositingForm::unit255_blinn;
     }
     std::int64_t unit() const { return (std::int64_t{1} << transparency_fraction) - (is_unit255() ? 1 : 0); }
+    std::int64_t color_unit() const { return is_unit255() ? unit() : std::int64_t{1} << sum_fraction; }
 };
 
 /// What a pixel has gathered so far.  T holds alpha in the alpha form.
@@ -51,6 +54,7 @@ struct Accumulated {
 }  // namespace squint
 #endif
 
+#include "core/rays.h"
 #include "fixedpoint/unrolled.h"
 
 #include <hwy/highway.h>
@@ -73,6 +77,16 @@ HWY_INLINE Accumulated<W> nothing_yet(const CompositingStage& s) {
 template <class W>
 HWY_INLINE W transparency(const CompositingStage& s, const Accumulated<W>& pixel) {
     return s.form == CompositingForm::alpha ? constant<W>(s.unit()) - pixel.transparency : pixel.transparency;
+}
+
+/// R G B A of what a pixel has gathered: where fixed point meets float.  Over a real word of core/rays.h.
+template <class D>
+HWY_INLINE std::array<D, 4> color_of(const CompositingStage& s, const Accumulated<D>& pixel) {
+    const double unit = static_cast<double>(s.unit());
+    const D t = s.form == CompositingForm::alpha ? D(unit) - pixel.transparency : pixel.transparency;
+    const Divisor of_color(static_cast<double>(s.color_unit()));
+    return {pixel.color[0] / of_color, pixel.color[1] / of_color, pixel.color[2] / of_color,
+            D(1) - t / Divisor(unit)};
 }
 
 /// Whether a ray goes on: T >= threshold.
@@ -106,10 +120,9 @@ HWY_INLINE void composite(const CompositingStage& s, Accumulated<W>& pixel, std:
     const W one = constant<W>(std::int64_t{1} << s.transparency_fraction);
     W& t = pixel.transparency;
     if (s.form == CompositingForm::w) {
-        const W w = quantise(alpha * t, s.to_contribution);
+        const W w = quantised_product(alpha, t, s.to_contribution);
         for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
-            const W share =
-                s.premultiplied ? quantise(color[c] * t, s.to_color) : quantise(color[c] * w, s.to_color);
+            const W share = quantised_product(color[c], s.premultiplied ? t : w, s.to_color);
             pixel.color[c] = quantise(pixel.color[c] + share, s.to_color_sum);
         });
         const int finer = std::max(s.contribution_fraction - s.transparency_fraction, 0);

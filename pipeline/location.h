@@ -10,6 +10,7 @@
 #include "fixedpoint/words.h"
 
 #include <array>
+#include <cmath>
 
 namespace squint {
 
@@ -47,6 +48,9 @@ struct LocationStage {
     int length_fraction = 0;
     Rescale to_first, to_direction, to_length;  // set-up values on their way to words: nothing to shift
     Spec location, direction, length;
+
+    /// How far a sample may leave the box before it is clamped, in voxels: what rounding V adds up to.
+    double drift() const { return std::ldexp(static_cast<double>(-low[0]), -common_fraction); }
 
     template <class V>
     void visit(V&& v) {

@@ -17,14 +17,9 @@ decltype(auto) with_method(const Plan& plan, F&& f) {
 }
 
 template <class W>
-std::array<double, 4> color_of(const Plan& plan, const Pixel<W>& pixel) {
-    const CompositingStage& s = plan.compositing;
-    const double unit = static_cast<double>(s.unit());
-    const double color_unit =
-        s.is_unit255() ? unit : static_cast<double>(plan.specs[Wire::color].format.one());
-    return {to_double(pixel.gathered.color[0]) / color_unit, to_double(pixel.gathered.color[1]) / color_unit,
-            to_double(pixel.gathered.color[2]) / color_unit,
-            1 - to_double(transparency(s, pixel.gathered)) / unit};
+Accumulated<double> in_doubles(const Accumulated<W>& pixel) {
+    return {{to_double(pixel.color[0]), to_double(pixel.color[1]), to_double(pixel.color[2])},
+            to_double(pixel.transparency)};
 }
 
 void put(Image& image, const char* name, std::size_t at, double value) {
@@ -43,7 +38,7 @@ template <class W>
 void store(const Plan& plan, const Pixel<W>& pixel, int column, int row, Image& image) {
     const std::size_t at = static_cast<std::size_t>(row) * static_cast<std::size_t>(image.width) +
                            static_cast<std::size_t>(column);
-    const std::array<double, 4> color = color_of(plan, pixel);
+    const std::array<double, 4> color = color_of(plan.compositing, in_doubles(pixel.gathered));
     for (std::size_t c = 0; c < 4; ++c)
         image.channels[c].values[at] = static_cast<float>(color[c]);  // R G B A come first
     const OutputSettings& output = plan.scene.output;
@@ -152,7 +147,8 @@ RayTrace trace_ray(const Plan& plan, int column, int row) {
     attach_statistics(traced, statistics);
     Collector collector{fresh, trace};
     with_method(traced, [&](const auto& method) {
-        trace.color = color_of(traced, cast_ray<Audited>(traced, method, trace.setup, collector));
+        const auto pixel = cast_ray<Audited>(traced, method, trace.setup, collector);
+        trace.color = color_of(traced.compositing, in_doubles(pixel.gathered));
     });
     collector.flush();
     return trace;

@@ -232,11 +232,26 @@ ClassificationInputs classification_inputs(const Plan& plan) {
         false};
 }
 
+void find_unseen_inputs(Plan& plan) {
+    const auto seen = [](const Entry& e) { return e.extinction > 0 || e.opaque; };
+    const auto& entries = plan.entries.entry;
+    const auto first = std::find_if(entries.begin(), entries.end(), seen) - entries.begin();
+    const auto behind = std::find_if(entries.rbegin(), entries.rend(), seen).base() - entries.begin();
+    const std::int64_t beside = 1 + plan.entry_reach;
+    const int input_fraction = fraction(plan, Wire::classification_input);
+    const auto input_at = [&](std::int64_t entry) {
+        return std::min<std::int64_t>(entry << input_fraction, std::numeric_limits<std::int32_t>::max());
+    };
+    plan.unseen_to = first < beside ? -1 : input_at(first - beside);
+    plan.unseen_from = input_at(behind - 1 + beside);
+}
+
 void plan_classification(Plan& plan) {
     plan.method = build_method(classification_inputs(plan));
     plan.needs_back =
         !plan.projection_mode && std::visit([](const auto& m) { return m.kNeedsBack; }, plan.method);
     plan.entry_reach = std::visit([](const auto& m) { return entry_reach(m); }, plan.method);
+    find_unseen_inputs(plan);
     ClassificationReport report;
     std::visit([&](const auto& m) { m.describe(report); }, plan.method);
     plan.tables = std::move(report.tables);
@@ -323,6 +338,7 @@ void plan_compositing(Plan& plan) {
     const int incoming = plan.lit ? fraction(plan, Wire::lit_color) : unlit;
     s.contribution_fraction = fraction(plan, Wire::contribution);
     s.transparency_fraction = fraction(plan, Wire::transparency);
+    s.sum_fraction = fraction(plan, Wire::color);
     const int t = s.transparency_fraction;
     const bool carries_alpha = s.premultiplied || s.form == CompositingForm::w;
     s.to_slab_color = rescale(plan, incoming + s.alpha_fraction, Wire::slab_color);
@@ -337,7 +353,7 @@ void plan_compositing(Plan& plan) {
             s.to_transparency = rescale(plan, std::max(t, s.contribution_fraction), Wire::transparency);
             break;
         case CompositingForm::back_to_front:
-            s.to_color = rescale(plan, fraction(plan, Wire::color) + s.alpha_fraction, Wire::color);
+            s.to_color = rescale(plan, s.sum_fraction + s.alpha_fraction, Wire::color);
             s.to_transparency = rescale(plan, t + s.alpha_fraction, Wire::transparency);
             break;
         default:

@@ -56,6 +56,9 @@ struct Plan {
     bool projection_mode = false;  // mip, minip, average
     bool needs_back = false;       // slab methods take the samples at both ends
     int entry_reach = 0;           // entries beside a slab's own that its colour may come from
+    // Inputs up to the one and from the other on are those of entries in which nothing is to be seen, nor in
+    // any beside them: a slab with both its ends there is transparent.
+    std::int64_t unseen_to = -1, unseen_from = std::numeric_limits<std::int32_t>::max();
     bool wants_depth = false;
     Rescale to_average;             // average mode: sum of inputs over their number
     bool skips_empty_space = true;  // a transparent sample is the identity

@@ -56,6 +56,7 @@ void leave_out_proven_limits(Plan& plan, const Slab<Range>& slab) {
     const bool unit_slab = within_unit(slab.alpha, s.alpha_fraction) &&
                            std::all_of(slab.color.begin(), slab.color.end(),
                                        [&](const Range& c) { return within_unit(c, s.color_fraction); });
+    s.of_units = unit_slab;
     if (s.form == CompositingForm::w && !s.premultiplied && unit_slab &&
         s.contribution_fraction == s.transparency_fraction && color.integer_bits >= 1 &&
         color.fraction_bits == s.contribution_fraction)

@@ -29,7 +29,7 @@ HWY_INLINE RaySetupOf<D> set_up_ray(const Plan& plan, D column, D row) {
     const RayOf<D> ray = ray_through(plan.camera, column, row);
     const IntervalOf<D> inside = intersect_box(ray, plan.box_low, plan.box_high);
     const D step_world(plan.step_world);
-    const D steps = (inside.last - inside.first) / step_world;
+    const D steps = (inside.last - inside.first) / Divisor(plan.step_world);
     // A chord of n steps is n slabs: 2^-30 steps forgive the rounding of the chord itself.
     const D whole = greater(D(1), ceiling(steps - D(0x1p-30)));
     // Samples of PC's mid-point rule stand in the middle of slabs.
@@ -43,7 +43,8 @@ HWY_INLINE RaySetupOf<D> set_up_ray(const Plan& plan, D column, D row) {
     const D to_last = middle ? inside.last - D(0.5) * setup.last_length * step_world : inside.last;
     for (int axis = 0; axis < 3; ++axis) {
         const auto a = static_cast<std::size_t>(axis);
-        const D spacing(volume.spacing[axis]), origin(volume.origin[axis]);
+        const D origin(volume.origin[axis]);
+        const Divisor spacing(volume.spacing[axis]);
         const auto voxel_at = [&](D distance) HWY_ATTR {
             return (ray.origin[a] + ray.direction[a] * distance - origin) / spacing;
         };
@@ -117,7 +118,7 @@ template <class W, class Setup>
 HWY_INLINE RayWords<W> ray_words(const Plan& plan, const Setup& ray) {
     using D = std::remove_cvref_t<decltype(ray.first[0])>;
     const LocationStage& s = plan.location;
-    RayWords<W> words{};
+    RayWords<W> words;
     for (int axis = 0; axis < 3; ++axis) {
         const auto a = static_cast<std::size_t>(axis);
         const W low = constant<W>(0), high = constant<W>(s.limit[a]);

@@ -65,15 +65,19 @@ struct InputStage {
     }
 };
 
+/// Where entries stand among inputs.
+struct EntrySpacing {
+    int input_fraction = 0;
+    int last_segment = 0;  // entries - 2
+};
+
 /// The sampled transfer function in words.
-struct EntryLookup {
+struct EntryLookup : EntrySpacing {
     enum Column { red, green, blue, alpha };       // of `table`
     enum MatterColumn { extinction, opaque };      // of `matter`
     enum Opaque { entry_is = 1, segment_is = 2 };  // bits of the column `opaque`
     Table table;                                   // what a full step of each entry looks like
     Table matter;                                  // what it is made of
-    int input_fraction = 0;
-    int last_segment = 0;  // entries - 2
     bool has_opaque = false;
     std::int64_t least_opaque = 0;  // opacity that no full step of an opaque entry falls below
     Rescale to_color, to_alpha;     // lerps between entries
@@ -182,7 +186,7 @@ struct EntryPosition {
     W entry, fraction;
 };
 template <class W>
-HWY_INLINE EntryPosition<W> entry_position(const EntryLookup& e, W input) {
+HWY_INLINE EntryPosition<W> entry_position(const EntrySpacing& e, W input) {
     const W entry = min(floor_shift(input, e.input_fraction), constant<W>(e.last_segment));
     return {entry, min(input - shift_left(entry, e.input_fraction),
                        constant<W>(std::int64_t{1} << e.input_fraction))};

@@ -84,6 +84,28 @@ void spread(std::vector<std::uint8_t>& distance, const Index3& blocks) {
     pass(true), pass(false);
 }
 
+void clear_corners(EmptySpace& space) {
+    const Index3 blocks = space.box.blocks, n = blocks + Index3(1);
+    space.corners = n;
+    space.clear.reserve(static_cast<std::size_t>(n.x * n.y * n.z) +
+                        3);  // lanes read four bytes at any of them
+    space.clear.assign(static_cast<std::size_t>(n.x * n.y * n.z), 255);
+    tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
+        for (std::int64_t y = 0; y < n.y; ++y) {
+            std::uint8_t* here = space.clear.data() + (z * n.y + y) * n.x;
+            for (const std::int64_t k : {z - 1, z})
+                for (const std::int64_t j : {y - 1, y}) {
+                    if (k < 0 || k >= blocks.z || j < 0 || j >= blocks.y) continue;
+                    const std::uint8_t* row = space.distance.data() + (k * blocks.y + j) * blocks.x;
+                    for (std::int64_t x = 0; x < blocks.x; ++x) {
+                        here[x] = std::min(here[x], row[x]);
+                        here[x + 1] = std::min(here[x + 1], row[x]);
+                    }
+                }
+        }
+    });
+}
+
 // Each block's range with its 26 neighbours': axis by axis.
 void widen(BlockRanges& ranges) {
     const Index3 n = ranges.box.blocks;
@@ -172,7 +194,6 @@ EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, i
     EmptySpace space;
     space.box = ranges.box;
     const Index3 n = space.box.blocks;
-    space.distance.reserve(ranges.smallest.size() + 3);  // lanes read four bytes at any of them
     space.distance.assign(ranges.smallest.size(), 255);
     std::atomic<std::int64_t> visible{0};
     tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
@@ -185,6 +206,7 @@ EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, i
     });
     space.visible_blocks = visible;
     spread(space.distance, n);
+    clear_corners(space);
     return space;
 }
 

@@ -34,13 +34,16 @@ std::shared_ptr<const BlockRanges> block_ranges(const Volume& volume, const Bloc
 struct EmptySpace {
     BlockBox box;  // no ray leaves it
     std::vector<std::uint8_t> distance;
+    Index3 corners{0, 0, 0};  // of the blocks: one more along each axis
+    std::vector<std::uint8_t>
+        clear;  // empty blocks about each corner on every side: its blocks' least distance
     std::int64_t visible_blocks = 0;
     std::uint8_t at(std::int64_t x, std::int64_t y, std::int64_t z) const {
         const Index3 &low = box.low, &n = box.blocks;
         return distance[static_cast<std::size_t>(((z - low.z) * n.y + y - low.y) * n.x + x - low.x)];
     }
-    /// Bytes of the ranges and distances of these blocks.
-    static std::int64_t bytes_for(const BlockBox& box) { return 5 * box.count(); }
+    /// About how many bytes the ranges and distances take of these blocks.
+    static std::int64_t bytes_for(const BlockBox& box) { return 6 * box.count(); }
 };
 
 /// `reach`: blocks that two neighbouring samples may lie apart, where the method sees the range between them;

@@ -2,6 +2,7 @@
 // lanes, a layout of the volume and what is known of the roundings.
 #pragma once
 
+#include "core/image.h"
 #include "pipeline/lanes/cell_blocks.h"
 #include "pipeline/lanes/empty_space.h"
 #include "pipeline/lanes/packet.h"
@@ -24,12 +25,12 @@ struct VoxelSource {
 struct StageKernels {
     /// Sets up a packet's rays: stage 1's words.
     void (*set_up)(const Plan&, const PacketPlace&, RayPacket&) = nullptr;
-    /// About where they run, for leave_out.
+    /// About where they run, for visible_rows.
     void (*set_course)(const Plan&, const EmptySpace&, const RayPacket&, RayCourse&) = nullptr;
-    /// Steps from slab k that every ray of the packet can leave out: all of them stay in blocks where nothing
-    /// is to be seen.  At most `most`.  They count as composited.
-    int (*leave_out)(const EmptySpace&, const RayPacket&, const Index3& dims, int k, int most, RayCourse&,
-                     PixelPacket&) = nullptr;
+    /// The next rows, from slab k on, in which any ray may meet something to be seen; no rows at the end.
+    Rows (*visible_rows)(const EmptySpace&, const RayPacket&, int k, RayCourse&) = nullptr;
+    /// Slabs [from, to) composite nothing: they count as composited.
+    void (*pass_over)(const RayPacket&, int from, int to, PixelPacket&) = nullptr;
     /// Rows [from, to): cells, weights and slab lengths.
     void (*locate)(const Plan&, const RayPacket&, int from, int to, Samples&) = nullptr;
     /// Rows [from, to): where the voxels lie, and a request to memory for them.
@@ -40,10 +41,11 @@ struct StageKernels {
     void (*interpolate)(const Plan&, int from, int to, Samples&) = nullptr;
     /// Slabs [0, steps): inputs to colours and opacities.
     void (*classify)(const Plan&, int steps, Samples&) = nullptr;
-    /// Of slabs [0, steps): those in which something is to be seen by a ray that goes on, packed.  Gives
-    /// their number.
-    int (*gather_lit)(const Plan&, const RayPacket&, const PixelPacket&, int steps, const Samples&,
-                      LitSamples&) = nullptr;
+    /// Front to back: of slabs [0, steps), those behind the end of their ray become transparent, for nobody
+    /// sees them.
+    void (*hide)(const Plan&, const RayPacket&, const PixelPacket&, int steps, Samples&) = nullptr;
+    /// Of slabs [0, steps): those in which something is to be seen, packed.  Gives their number.
+    int (*gather_lit)(const Plan&, const RayPacket&, int steps, const Samples&, LitSamples&) = nullptr;
     /// The voxels about the first `count` gathered samples, as many as the gradient's rule wants.
     void (*fetch_lit)(const Plan&, int count, LitSamples&) = nullptr;
     /// In place of fetch_lit for gradients from samples.  Rows [0, rows) of 16 gathered samples each: one
@@ -58,6 +60,8 @@ struct StageKernels {
     /// T at the slabs' ends: row s at the front of slab s.
     void (*composite)(const Plan&, const RayPacket&, int steps, const Samples&, PixelPacket&,
                       Batch& between) = nullptr;
+    /// R G B A of a packet's pixels into an image.
+    void (*store_colors)(const Plan&, const PixelPacket&, const PacketPlace&, Image&) = nullptr;
     /// Inputs of slabs [0, steps) onto what stands for their rays: in place of classifying and compositing
     /// them.
     void (*project)(const RayPacket&, int steps, const Samples&, ProjectionPacket&) = nullptr;

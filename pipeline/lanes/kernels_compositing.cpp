@@ -23,6 +23,12 @@ bool is_plain(const CompositingStage& s) {
            s.contribution_fraction == s.transparency_fraction && drops_bits(s.to_contribution) &&
            drops_bits(s.to_color) && does_nothing(s.to_color_sum) && does_nothing(s.to_transparency);
 }
+/// Its products are those of numbers from 0 to 1 of 15 bits.
+bool is_of_units(const CompositingStage& s) {
+    const auto drops_15 = [](const Rescale& to) { return to.shift == 15 && to.to_even == 1; };
+    return is_plain(s) && s.of_units && s.alpha_fraction == 15 && s.color_fraction == 15 &&
+           s.transparency_fraction == 15 && drops_15(s.to_contribution) && drops_15(s.to_color);
+}
 /// Says so to the compiler.
 HWY_INLINE void take_as_plain(CompositingStage& s) {
     s.form = CompositingForm::w, s.premultiplied = false;
@@ -61,17 +67,16 @@ void composite_rows(const Plan& plan, const lanes::RayPacket& packet, int steps,
             const std::array<L, 3> color{load<L>(samples.color[0].v + at), load<L>(samples.color[1].v + at),
                                          load<L>(samples.color[2].v + at)};
             count = count + select(here, one, zero);
-            if (transparent_is_identity) {
-                const L seen = select(here, alpha, zero);
-                if (any(zero < seen)) composite(stage, pixel, color, seen);
-            } else {
-                Accumulated<L> next = pixel;
-                composite(stage, next, color, alpha);
-                for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
-                    pixel.color[c] = select(here, next.color[c], pixel.color[c]);
-                });
-                pixel.transparency = select(here, next.transparency, pixel.transparency);
+            if (transparent_is_identity && !any(zero < alpha)) {
+                if (!backwards) active = here;
+                continue;
             }
+            Accumulated<L> next = pixel;
+            composite(stage, next, color, alpha);
+            for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
+                pixel.color[c] = select(here, next.color[c], pixel.color[c]);
+            });
+            pixel.transparency = select(here, next.transparency, pixel.transparency);
             if (!backwards) active = here & goes_on(stage, pixel);
         }
         keep_transparency(backwards ? 0 : steps);
@@ -82,14 +87,74 @@ void composite_rows(const Plan& plan, const lanes::RayPacket& packet, int steps,
     }
 }
 
+/// Transparency alone, front to back: it does not wait for colours.
+template <class L, bool kPlain>
+void hide_rows(const Plan& plan, const lanes::RayPacket& packet, const lanes::PixelPacket& pixels, int steps,
+               lanes::Samples& samples) {
+    CompositingStage stage = plan.compositing;
+    if constexpr (kPlain) take_as_plain(stage);
+    const L zero = constant<L>(0);
+    for (int r = 0; r < lanes::kRays; r += static_cast<int>(L::count())) {
+        L transparency = load<L>(pixels.transparency.v + r);
+        const L slabs = load_whole<L>(packet.slabs.v + r);
+        auto active = zero < load_whole<L>(pixels.active.v + r);
+        for (int step = 0; step < steps; ++step) {
+            const int at = step * lanes::kRays + r;
+            const auto here = active & (constant<L>(samples.first + step) < slabs);
+            const L alpha = load<L>(samples.alpha.v + at);
+            store(select(here, alpha, zero), samples.alpha.v + at);
+            Accumulated<L> next{{zero, zero, zero}, transparency};
+            composite(stage, next, {zero, zero, zero}, alpha);
+            transparency = next.transparency = select(here, next.transparency, transparency);
+            active = here & goes_on(stage, next);
+        }
+    }
+}
+
+/// One word a pixel from a packet, as model.h's to_double has it.
+HWY_INLINE Reals values_of(bool are_floats, const lanes::Word* words) {
+    const hn::Rebind<lanes::Word, Reals::D> narrow;
+    const auto bits = hn::LoadU(narrow, words);
+    if (!are_floats) return Reals(hn::PromoteTo(Reals::D(), bits));
+    return Reals(hn::PromoteTo(Reals::D(), hn::BitCast(hn::Rebind<float, Reals::D>(), bits)));
+}
+
+void store_colors(const Plan& plan, const lanes::PixelPacket& pixels, const lanes::PacketPlace& place,
+                  Image& image) {
+    const hn::Rebind<float, Reals::D> narrow;
+    lanes::RealRow color[4];
+    for (int r = 0; r < lanes::kRays; r += Reals::count()) {
+        const auto value = [&](const lanes::Row& row) { return values_of(plan.float32, row.v + r); };
+        const std::array<Reals, 4> values = color_of(
+            plan.compositing,
+            Accumulated<Reals>{{value(pixels.color[0]), value(pixels.color[1]), value(pixels.color[2])},
+                               value(pixels.transparency)});
+        for (std::size_t c = 0; c < 4; ++c)
+            hn::StoreU(hn::DemoteTo(narrow, values[c].v), narrow, color[c].v + r);
+    }
+    const int columns = std::min(lanes::kSide, place.right - place.left),
+              rows = std::min(lanes::kSide, place.bottom - place.top);
+    for (std::size_t c = 0; c < 4; ++c)  // R G B A come first
+        for (int row = 0; row < rows; ++row) {
+            const auto at =
+                static_cast<std::size_t>(place.top + row) * static_cast<std::size_t>(image.width) +
+                static_cast<std::size_t>(place.left);
+            std::copy_n(color[c].v + row * lanes::kSide, columns, image.channels[c].values.data() + at);
+        }
+}
+
 }  // namespace
 
 void compositing_kernel_of(const Plan& plan, const lanes::StageWay& way, lanes::StageKernels& kernels) {
     lanes::with_word<Lanes, KnownRescales::halves_to_even>(way, [&]<class L>() {
+        kernels.hide = is_plain(plan.compositing) ? &hide_rows<L, true> : &hide_rows<L, false>;
         kernels.composite = plan.scene.output.depth      ? &composite_rows<L, false, true>
                             : is_plain(plan.compositing) ? &composite_rows<L, true, false>
                                                          : &composite_rows<L, false, false>;
     });
+    if (way.bits == 32 && !way.is_float && !plan.scene.output.depth && is_of_units(plan.compositing))
+        kernels.composite = &composite_rows<Lanes<std::int32_t, KnownRescales::unit_products>, true, false>;
+    kernels.store_colors = &store_colors;
 }
 
 }  // namespace squint::HWY_NAMESPACE

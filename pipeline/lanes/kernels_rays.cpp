@@ -9,8 +9,9 @@
 #include "pipeline/lanes/kernels.h"
 #include "pipeline/ray_setup.h"
 
+#include <algorithm>
 #include <bit>
-#include <limits>
+#include <cmath>
 
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
@@ -71,53 +72,97 @@ constexpr float float_power(int bits) {
     return std::bit_cast<float>((bits + 127) << 23);
 }
 
+/// The group of 2x2 pixels that ray r of a packet belongs to.
+constexpr int beam_of(int r) {
+    return r % lanes::kSide / 2 + r / lanes::kSide / 2 * 2;
+}
+
+/// Along a course, the largest distance over the axes of any ray of a beam from it: at one of its ends, for
+/// both are straight.
+float farthest_off(const lanes::RayPacket& rays, const float (*first)[kRays], const float (*step)[kRays],
+                   const lanes::RayCourse& course) {
+    const hn::ScalableTag<float> df;
+    const hn::ScalableTag<Word> d;
+    const auto last = hn::Set(df, static_cast<float>(rays.most_slabs));
+    auto off = hn::Zero(df);
+    for (int a = 0; a < 3; ++a) {
+        lanes::RealRow middle, middle_step;
+        for (int r = 0; r < kRays; ++r) {
+            const int beam = course.beams == 1 ? 0 : beam_of(r);
+            middle.v[r] = course.first[beam][a], middle_step.v[r] = course.step[beam][a];
+        }
+        for (int r = 0; r < kRays; r += static_cast<int>(hn::Lanes(d))) {
+            const auto begin = hn::Sub(hn::Load(df, first[a] + r), hn::Load(df, middle.v + r)),
+                       apart = hn::Sub(hn::Load(df, step[a] + r), hn::Load(df, middle_step.v + r));
+            const auto here = hn::Max(hn::Abs(begin), hn::Abs(hn::MulAdd(apart, last, begin)));
+            const auto there = hn::RebindMask(df, hn::Gt(hn::Load(d, rays.slabs.v + r), hn::Zero(d)));
+            off = hn::Max(off, hn::IfThenElseZero(there, here));
+        }
+    }
+    return hn::GetLane(hn::MaxOfLanes(df, off));
+}
+
 void set_course(const Plan& plan, const lanes::EmptySpace& empty, const lanes::RayPacket& rays,
                 lanes::RayCourse& course) {
+    using lanes::RayCourse;
     const hn::ScalableTag<float> df;
     const hn::ScalableTag<Word> d;
     const LocationStage& stage = plan.location;
-    const auto cell_unit = hn::Set(df, float_power(-stage.location_fraction)),
-               step_unit = hn::Set(df, float_power(-stage.direction_fraction));
-    const Index3 &n = plan.volume->dims, &low = empty.box.low, &blocks = empty.box.blocks;
-    // A location is rounded once, by a last bit at most; floats add their own error.
-    course.margin = float_power(-stage.location_fraction) +
-                    static_cast<float>(std::max({n.x, n.y, n.z})) * 0x1p-20F + 0x1p-10F;
-    const int to_block = stage.location_fraction + lanes::kBlockBits;
+    const Index3 &n = plan.volume->dims, &low = empty.box.low;
+    const auto cell_unit = hn::Set(df, float_power(-stage.location_fraction - lanes::kBlockBits)),
+               step_unit = hn::Set(df, float_power(-stage.direction_fraction - lanes::kBlockBits));
     const auto value_at = [&](const Word* from) HWY_ATTR {  // in raw units
         const auto bits = hn::Load(d, from);
         return plan.float32 ? hn::BitCast(df, bits) : hn::ConvertTo(df, bits);
     };
-    const auto block_at = [&](const Word* from) HWY_ATTR {
-        if (plan.float32)
-            return hn::ShiftRight<lanes::kBlockBits>(hn::ConvertTo(d, hn::Mul(value_at(from), cell_unit)));
-        return shift_right_same(hn::Load(d, from), to_block);
-    };
-    for (int r = 0; r < kRays; r += static_cast<int>(hn::Lanes(d))) {
-        auto block = hn::Zero(d);  // of the ray's last sample
-        for (int a = 2; a >= 0; --a) {
-            const auto step = hn::Mul(value_at(rays.step[a].v + r), step_unit);
-            hn::Store(hn::Mul(value_at(rays.first[a].v + r), cell_unit), df, course.first[a].v + r);
-            hn::Store(step, df, course.step[a].v + r);
-            const auto still = hn::Eq(step, hn::Zero(df));
-            const auto pace =
-                hn::Div(hn::Set(df, 1.0F), hn::Abs(hn::IfThenElse(still, hn::Set(df, 1.0F), step)));
-            hn::Store(hn::IfThenElse(still, hn::Set(df, 1e30F), pace), df, course.pace[a].v + r);
-            const auto of_all = block_at(rays.last[a].v + r);
-            const auto here =
-                hn::Min(hn::Max(hn::Sub(of_all, hn::Set(d, static_cast<Word>(low[a]))), hn::Zero(d)),
-                        hn::Set(d, static_cast<Word>(blocks[a] - 1)));
-            block = hn::Add(hn::Mul(block, hn::Set(d, static_cast<Word>(blocks[a]))), here);
+    alignas(64) float first[3][kRays], step[3][kRays];  // blocks
+    for (int a = 0; a < 3; ++a)
+        for (int r = 0; r < kRays; r += static_cast<int>(hn::Lanes(d))) {
+            const auto p = hn::Mul(value_at(rays.first[a].v + r), cell_unit);
+            hn::Store(hn::Sub(p, hn::Set(df, static_cast<float>(low[a]))), df, first[a] + r);
+            hn::Store(hn::Mul(value_at(rays.step[a].v + r), step_unit), df, step[a] + r);
         }
-        // The ray's last sample stands at its exit, off P0 + kV by what rounding V adds up to.
-        const auto distance =
-            hn::And(hn::GatherOffset(d, reinterpret_cast<const Word*>(empty.distance.data()), block),
-                    hn::Set(d, 0xff));
-        const auto last = hn::Sub(hn::Load(d, rays.last_index.v + r), hn::Set(d, plan.needs_back ? 1 : 0));
-        hn::Store(
-            hn::IfThenElse(hn::Gt(distance, hn::Zero(d)), hn::Set(d, std::numeric_limits<Word>::max()), last),
-            d, course.skippable.v + r);
-        hn::Store(hn::Zero(d), d, course.free_until.v + r);
-    }
+    // Between the first and the last ray of each beam.
+    const auto set_beams = [&](int beams) {
+        int one[RayCourse::kMostBeams], other[RayCourse::kMostBeams];
+        std::fill_n(one, beams, -1);
+        int any = 0;
+        for (int r = 0; r < kRays; ++r) {
+            if (rays.slabs.v[r] == 0) continue;
+            const int beam = beams == 1 ? 0 : beam_of(r);
+            if (one[beam] < 0) one[beam] = r;
+            any = other[beam] = r;
+        }
+        course.beams = beams;
+        for (int beam = 0; beam < beams; ++beam) {
+            if (one[beam] < 0) one[beam] = other[beam] = any;
+            for (int a = 0; a < 3; ++a) {
+                course.first[beam][a] = 0.5F * (first[a][one[beam]] + first[a][other[beam]]);
+                course.step[beam][a] = 0.5F * (step[a][one[beam]] + step[a][other[beam]]);
+            }
+        }
+        return farthest_off(rays, first, step, course);
+    };
+    // A location is rounded once, by a last bit at most; the last stands at its exit, off P0 + kV by what
+    // rounding V adds up to; floats add their own error.
+    const float margin = (float_power(-stage.location_fraction) + static_cast<float>(stage.drift()) +
+                          static_cast<float>(std::max({n.x, n.y, n.z})) * 0x1p-20F + 0x1p-10F) /
+                         lanes::kBlock;
+    constexpr float kNearest = 0.5F;  // from a place to the nearest corner of blocks
+    float reach = set_beams(1);
+    if (reach + margin > kNearest) reach = set_beams(RayCourse::kMostBeams);
+    const float off = reach + margin + kNearest;
+    float fastest = 0x1p-10F;  // blocks a step
+    for (int beam = 0; beam < course.beams; ++beam)
+        for (const float v : course.step[beam]) fastest = std::max(fastest, std::abs(v));
+    const float stride = std::max(std::floor(1 / fastest), 1.0F);
+    const auto blocks_for = [](float distance) {
+        return distance < 250 ? static_cast<int>(std::ceil(distance)) : 256;
+    };
+    course.enough = blocks_for(off);
+    course.stride = static_cast<int>(stride);
+    course.enough_of_stride = blocks_for(off + 0.5F * (stride - 1) * fastest);
+    course.window = -RayCourse::kWindow, course.may_be_seen = 0;
 }
 
 }  // namespace

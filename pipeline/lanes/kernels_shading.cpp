@@ -84,42 +84,45 @@ HWY_INLINE std::array<G, 3> slab_gradient(const Plan& plan, const GradientStage&
     return gradient;
 }
 
-/// G: the lanes of the raw gradient, whose lerps may need wider ones than all that follows.  Where they
-/// differ it passes through 32-bit words, which hold whatever 32-bit lanes do.
+/// G: the lanes of the raw gradient, whose lerps may need wider ones than all that follows: it passes through
+/// 32-bit words, which hold whatever 32-bit lanes do.  Loops apart, for each vector's way through them is one
+/// long chain: in a loop of its own the next vectors' run beside it.
 template <class G, class L>
 void shade_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
     const GradientStage stage = plan.gradient;
     const ShadingStage& shading = plan.shading;
     const bool per_ray = shading.half_per_ray || shading.model == ShadingModel::phong;
-    const bool keeps_normals = plan.scene.output.normals;
-    constexpr bool kAlike = std::is_same_v<G, L>;
-    if constexpr (!kAlike) {
-        // To the end of the widest vector, which the second loop reads whole.
+    // 64-bit lanes' gradients need not fit 32-bit words.
+    constexpr bool kStored = !std::is_same_v<L, Lanes<std::int64_t>>;
+    if constexpr (kStored) {
+        // To the end of the widest vector, which the loop behind reads whole.
         constexpr int kStep = static_cast<int>(std::max(G::count(), L::count()));
         for (int at = 0; at < (count + kStep - 1) / kStep * kStep; at += static_cast<int>(G::count())) {
             const std::array<G, 3> gradient = slab_gradient<G>(plan, stage, lit, at);
             for (std::size_t a = 0; a < 3; ++a) store(gradient[a], lit.gradient[a].v + at);
         }
     }
+    const auto three = [](const lanes::Batch(&from)[3], int at) HWY_ATTR {
+        return std::array<L, 3>{load<L>(from[0].v + at), load<L>(from[1].v + at), load<L>(from[2].v + at)};
+    };
     for (int at = 0; at < count; at += static_cast<int>(L::count())) {
         std::array<L, 3> gradient;
-        if constexpr (kAlike)
-            gradient = slab_gradient<L>(plan, stage, lit, at);
+        if constexpr (kStored)
+            gradient = three(lit.gradient, at);
         else
-            for (std::size_t a = 0; a < 3; ++a) gradient[a] = load<L>(lit.gradient[a].v + at);
+            gradient = slab_gradient<L>(plan, stage, lit, at);
         const std::array<L, 3> normal = normalise(stage, gradient);
-        if (keeps_normals)
-            for (std::size_t a = 0; a < 3; ++a) store(normal[a], lit.normal[a].v + at);
+        for (std::size_t a = 0; a < 3; ++a) store(normal[a], lit.normal[a].v + at);
+    }
+    for (int at = 0; at < count; at += static_cast<int>(L::count())) {
         RayWords<L> ray;
-        if (per_ray)
-            for (std::size_t a = 0; a < 3; ++a) {
-                ray.view[a] = load<L>(lit.view[a].v + at);
-                for (std::size_t l = 0; l < static_cast<std::size_t>(shading.lights); ++l)
-                    ray.half[l][a] = load<L>(lit.half[l][a].v + at);
-            }
-        std::array<L, 3> color{load<L>(lit.color[0].v + at), load<L>(lit.color[1].v + at),
-                               load<L>(lit.color[2].v + at)};
-        shade(shading, ray, normal, load<L>(lit.alpha.v + at), color);
+        if (per_ray) {
+            ray.view = three(lit.view, at);
+            for (std::size_t l = 0; l < static_cast<std::size_t>(shading.lights); ++l)
+                ray.half[l] = three(lit.half[l], at);
+        }
+        std::array<L, 3> color = three(lit.color, at);
+        shade(shading, ray, three(lit.normal, at), load<L>(lit.alpha.v + at), color);
         for (std::size_t c = 0; c < 3; ++c) store(color[c], lit.color[c].v + at);
     }
 }

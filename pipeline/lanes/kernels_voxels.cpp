@@ -10,6 +10,7 @@
 #include "pipeline/lanes/kernels.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <limits>
 
@@ -18,6 +19,7 @@ namespace squint::HWY_NAMESPACE {
 namespace {
 
 using lanes::kRays;
+using lanes::kSide;
 using lanes::Samples;
 using lanes::VoxelSource;
 using lanes::Word;
@@ -53,20 +55,39 @@ HWY_INLINE const T* corner_of(const Volume& volume, const Samples& s, int i) {
     return static_cast<const T*>(volume.data.get()) + s.cell[0].v[i] +
            volume.dims.x * (s.cell[1].v[i] + volume.dims.y * s.cell[2].v[i]);
 }
-template <class T>
+
+// A packet's outermost rays stand for those between them.
+constexpr int kOutermost[] = {0, kSide - 1, kRays - kSide, kRays - 1};
+
+/// kNumbered: the number of any voxel fits a word; the cells' lowest corners are numbered in `place`.
+template <class T, bool kNumbered>
 void prefetch_linear(const VoxelSource& source, int from, int to, Samples& s) {
-    const PairOffsets offsets(*source.volume);
+    const Volume& volume = *source.volume;
+    const PairOffsets offsets(volume);
+    const hn::ScalableTag<Word> d;
+    if constexpr (kNumbered) {
+        const auto row = hn::Set(d, static_cast<Word>(volume.dims.x)),
+                   slice = hn::Set(d, static_cast<Word>(volume.dims.x * volume.dims.y));
+        for (int at = from * kRays; at < to * kRays; at += kLanes) {
+            const auto y = hn::Mul(hn::Load(d, s.cell[1].v + at), row),
+                       z = hn::Mul(hn::Load(d, s.cell[2].v + at), slice);
+            hn::Store(hn::Add(hn::Load(d, s.cell[0].v + at), hn::Add(y, z)), d, s.place.v + at);
+        }
+    }
     // Every second step will do, for neighbours share cache lines.
-    for (int row = from; row < to; row += 2)
-        for (int i = row * kRays; i < (row + 1) * kRays; ++i)
-            for (const std::int64_t offset : offsets.pair)
-                __builtin_prefetch(corner_of<T>(*source.volume, s, i) + offset);
+    for (int i = from * kRays; i < to * kRays; i += 2 * kRays)
+        for (const int ray : kOutermost) {
+            const T* corner = corner_of<T>(volume, s, i + ray);
+            for (const std::int64_t offset : offsets.pair) __builtin_prefetch(corner + offset);
+        }
 }
-template <class T>
+template <class T, bool kNumbered>
 void fetch_linear(const VoxelSource& source, int from, int to, Samples& s) {
-    const PairOffsets offsets(*source.volume);
+    const Volume& volume = *source.volume;
+    const PairOffsets offsets(volume);
+    const T* const voxels = static_cast<const T*>(volume.data.get());
     for (int i = from * kRays; i < to * kRays; ++i) {
-        const T* corner = corner_of<T>(*source.volume, s, i);
+        const T* corner = kNumbered ? voxels + s.place.v[i] : corner_of<T>(volume, s, i);
         for (int p = 0; p < 4; ++p) s.pair[p].v[i] = pair_at(corner + offsets.pair[p]);
     }
 }
@@ -91,8 +112,6 @@ void prefetch_cells(const VoxelSource& source, int from, int to, Samples& s) {
         const auto slot = hn::GatherIndex(d, source.slots.data(), block);
         hn::Store(hn::Or(slot, offset), d, s.place.v + at);  // -1 stays -1
     }
-    // A packet's outermost rays stand for those between them.
-    constexpr int kOutermost[] = {0, 3, 12, 15};
     for (int i = from * kRays; i < to * kRays; i += kRays)
         for (const int ray : kOutermost)
             __builtin_prefetch(source.cells + std::int64_t{std::max(s.place.v[i + ray], 0)} *
@@ -132,8 +151,8 @@ void fetch_cells(const VoxelSource& source, int from, int to, Samples& s) {
 // ------------------------------------------------------------------------------------------------ samples to
 // be lit
 
-int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, const lanes::PixelPacket& pixels,
-                       int steps, const Samples& s, lanes::LitSamples& lit) {
+int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, int steps, const Samples& s,
+                       lanes::LitSamples& lit) {
     const hn::ScalableTag<Word> d;
     const auto zero = hn::Zero(d);
     const bool per_ray = plan.shading.half_per_ray || plan.shading.model == ShadingModel::phong;
@@ -142,8 +161,7 @@ int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, const lan
     for (int at = 0; at < steps * kRays; at += kLanes) {
         const int r = at % kRays;
         const auto within = hn::Gt(hn::Load(d, rays.slabs.v + r), hn::Set(d, s.first + at / kRays));
-        const auto wanted = hn::And(hn::And(hn::Gt(hn::Load(d, s.alpha.v + at), zero), within),
-                                    hn::Gt(hn::Load(d, pixels.active.v + r), zero));
+        const auto wanted = hn::And(hn::Gt(hn::Load(d, s.alpha.v + at), zero), within);
         const auto many = hn::CountTrue(d, wanted);
         if (many == 0) continue;
         // Whole vectors are stored; what lies behind the last sample is written over by the next.
@@ -287,103 +305,109 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
 // ------------------------------------------------------------------------------------------------ empty
 // space
 
-/// How many samples from number `at` on, of each ray, lie in empty blocks: the one at `at` and those up to
-/// the far side of the empty blocks around it.  0 or less where that one may not be left out.
-auto empty_ahead(const lanes::EmptySpace& empty, const lanes::RayCourse& course, const Index3& dims, int r,
-                 hn::Vec<hn::ScalableTag<Word>> at) {
+/// Bit i of the answer: whether something may be seen about some beam at row `at[i]`, i < kWindow.
+template <class At>
+std::uint32_t seen_about(const lanes::EmptySpace& empty, const lanes::RayCourse& course, int enough,
+                         At&& at) {
     const hn::ScalableTag<float> df;
     const hn::ScalableTag<Word> d;
-    const auto zero = hn::Zero(d), one = hn::Set(d, 1);
-    const auto margin = hn::Set(df, course.margin), side = hn::Set(df, float(lanes::kBlock)),
-               inner_side = hn::Sub(side, margin);
-    const Index3 &low_block = empty.box.low, &counts = empty.box.blocks;
-    const Word strides[3] = {1, static_cast<Word>(counts.x), static_cast<Word>(counts.x * counts.y)};
-    const auto number = hn::ConvertTo(df, at);
-    hn::Vec<decltype(df)> p[3], low_side[3];  // where the ray is, and the lower face of its block there
-    auto index = zero;
-    auto beside = hn::Gt(zero, zero);  // a sample may lie in the next block
-    for (int a = 0; a < 3; ++a) {
-        p[a] = hn::MulAdd(number, hn::Load(df, course.step[a].v + r), hn::Load(df, course.first[a].v + r));
-        // From here on, in voxels from the lowest block.
-        const std::int64_t first = low_block[a] * lanes::kBlock;
-        p[a] = hn::Sub(p[a], hn::Set(df, float(first)));
-        p[a] = hn::Min(hn::Max(p[a], hn::Zero(df)), hn::Set(df, float(dims[a] - 1 - first)));
-        const auto last = hn::Set(d, static_cast<Word>(counts[a] - 1));
-        const auto block = hn::Min(hn::ShiftRight<lanes::kBlockBits>(hn::ConvertTo(d, p[a])), last);
-        low_side[a] = hn::Mul(hn::ConvertTo(df, block), side);
-        const auto inside = hn::Sub(p[a], low_side[a]);
-        const auto near_low = hn::And(hn::RebindMask(d, hn::Lt(inside, margin)), hn::Gt(block, zero));
-        const auto near_high = hn::And(hn::RebindMask(d, hn::Gt(inside, inner_side)), hn::Lt(block, last));
-        beside = hn::Or(beside, hn::Or(near_low, near_high));
-        index = hn::Add(index, hn::Mul(block, hn::Set(d, strides[a])));
+    const Index3& corners = empty.corners;
+    std::uint32_t seen = 0;
+    for (int lane = 0; lane < lanes::RayCourse::kWindow; lane += kLanes) {
+        const auto row = at(lane);
+        auto here = hn::Gt(hn::Zero(d), hn::Zero(d));
+        for (int beam = 0; beam < course.beams; ++beam) {
+            auto index = hn::Zero(d);
+            for (int a = 2; a >= 0; --a) {
+                const auto p =
+                    hn::MulAdd(row, hn::Set(df, course.step[beam][a]), hn::Set(df, course.first[beam][a]));
+                const auto inside =
+                    hn::Min(hn::Max(p, hn::Zero(df)), hn::Set(df, static_cast<float>(corners[a] - 1)));
+                index = hn::Add(hn::Mul(index, hn::Set(d, static_cast<Word>(corners[a]))),
+                                hn::NearestInt(inside));
+            }
+            const auto clear =
+                hn::And(hn::GatherOffset(d, reinterpret_cast<const Word*>(empty.clear.data()), index),
+                        hn::Set(d, 0xff));
+            here = hn::Or(here, hn::Lt(clear, hn::Set(d, enough)));
+        }
+        std::uint8_t bits[8] = {};
+        hn::StoreMaskBits(d, here, bits);
+        seen |= static_cast<std::uint32_t>(bits[0] | bits[1] << 8) << lane;
     }
-    auto distance = hn::And(hn::GatherOffset(d, reinterpret_cast<const Word*>(empty.distance.data()), index),
-                            hn::Set(d, 0xff));
-    distance = hn::Sub(distance, hn::IfThenElseZero(beside, one));
-    // To the far side of the empty blocks ahead.
-    const auto empty_side = hn::Mul(hn::ConvertTo(df, distance), side);
-    auto steps = hn::Set(df, 1e6F);
-    for (int a = 0; a < 3; ++a) {
-        const auto up = hn::Sub(hn::Add(low_side[a], empty_side), p[a]);
-        const auto down = hn::Sub(p[a], hn::Sub(hn::Add(low_side[a], side), empty_side));
-        const auto backwards = hn::Lt(hn::Load(df, course.step[a].v + r), hn::Zero(df));
-        const auto way = hn::Sub(hn::IfThenElse(backwards, down, up), margin);
-        steps = hn::Min(steps, hn::Mul(way, hn::Load(df, course.pace[a].v + r)));
-    }
-    // The last sample inside is left out, too: the next one is looked at anew.
-    const auto free = hn::Add(hn::ConvertTo(d, hn::Max(steps, hn::Zero(df))), one);
-    return hn::IfThenElseZero(hn::Gt(distance, zero),
-                              hn::Min(free, hn::Sub(hn::Load(d, course.skippable.v + r), at)));
+    return seen;
 }
 
-int leave_out_empty(const lanes::EmptySpace& empty, const lanes::RayPacket& rays, const Index3& dims, int k,
-                    int most, lanes::RayCourse& course, lanes::PixelPacket& pixels) {
-    const hn::ScalableTag<Word> d;
-    const auto zero = hn::Zero(d), here = hn::Set(d, k);
-    auto least = hn::Set(d, k + most);  // the first sample that stays, in every lane
-    for (int r = 0; r < kRays; r += kLanes) {
-        const auto goes_on = hn::And(hn::Gt(hn::Load(d, pixels.active.v + r), zero),
-                                     hn::Gt(hn::Load(d, rays.slabs.v + r), here));
-        // Each ray on its own, from where it was seen to be free to the first sample that is not.
-        auto until = hn::Max(hn::Load(d, course.free_until.v + r), here);
-        auto looks = hn::And(goes_on, hn::Lt(until, least));
-        while (!hn::AllFalse(d, looks)) {
-            const auto ahead = empty_ahead(empty, course, dims, r, until);
-            const auto stops = hn::AndNot(hn::Gt(ahead, zero), looks);
-            until = hn::Add(until, hn::IfThenElseZero(hn::AndNot(stops, looks), ahead));
-            if (!hn::AllFalse(d, stops)) least = hn::MinOfLanes(d, hn::IfThenElse(stops, until, least));
-            looks = hn::And(hn::AndNot(stops, looks), hn::Lt(until, least));
+lanes::Rows visible_rows_of(const lanes::EmptySpace& empty, const lanes::RayPacket& rays, int k,
+                            lanes::RayCourse& course) {
+    constexpr int kWindow = lanes::RayCourse::kWindow;
+    const hn::ScalableTag<float> df;
+    const auto rows_from = [&](int first, float apart, float begin) {
+        return [=](int lane) HWY_ATTR {
+            return hn::MulAdd(hn::Iota(df, static_cast<float>(lane)), hn::Set(df, apart),
+                              hn::Set(df, static_cast<float>(first) + begin));
+        };
+    };
+    while (k < rays.most_slabs) {
+        if (k + lanes::kSteps > course.window + kWindow) {
+            course.window = k;
+            course.may_be_seen = seen_about(empty, course, course.enough, rows_from(k, 1, 0));
         }
-        hn::Store(until, d, course.free_until.v + r);
+        const std::uint32_t ahead = course.may_be_seen >> (k - course.window);
+        const int skipped = ahead ? std::countr_zero(ahead) : 0;
+        if (ahead && k + skipped + lanes::kSteps <= course.window + kWindow) {
+            const auto batch = (ahead >> skipped) & ((1U << lanes::kSteps) - 1);
+            const int first = k + skipped;
+            return {first, std::clamp(static_cast<int>(std::bit_width(batch)), 0, rays.most_slabs - first)};
+        }
+        if (ahead) {
+            k += skipped;
+            continue;
+        }
+        // A wide gap, perhaps.
+        k = course.window + kWindow;
+        const auto n = static_cast<float>(course.stride);
+        for (std::uint32_t seen = 0; seen == 0 && k < rays.most_slabs;) {
+            seen = seen_about(empty, course, course.enough_of_stride, rows_from(k, n, 0.5F * (n - 1)));
+            k += (seen ? std::countr_zero(seen) : kWindow) * course.stride;
+        }
     }
-    const int left_out = hn::GetLane(least) - k;
-    if (left_out == 0) return 0;
+    return {rays.most_slabs, 0};
+}
+
+void pass_over_rows(const lanes::RayPacket& rays, int from, int to, lanes::PixelPacket& pixels) {
+    const hn::ScalableTag<Word> d;
+    const auto zero = hn::Zero(d);
     for (int r = 0; r < kRays; r += kLanes) {
-        const auto slabs =
-            hn::Min(hn::Max(hn::Sub(hn::Load(d, rays.slabs.v + r), here), zero), hn::Set(d, left_out));
+        const auto slabs = hn::Min(hn::Max(hn::Sub(hn::Load(d, rays.slabs.v + r), hn::Set(d, from)), zero),
+                                   hn::Set(d, to - from));
         const auto active = hn::Gt(hn::Load(d, pixels.active.v + r), zero);
-        const auto samples = hn::Load(d, pixels.samples.v + r);
-        hn::Store(hn::Add(samples, hn::IfThenElseZero(active, slabs)), d, pixels.samples.v + r);
+        hn::Store(hn::Add(hn::Load(d, pixels.samples.v + r), hn::IfThenElseZero(active, slabs)), d,
+                  pixels.samples.v + r);
     }
-    return left_out;
 }
 
 template <class T>
-void choose_voxel_kernels(bool cells, lanes::StageKernels& kernels) {
-    kernels.prefetch = cells ? &prefetch_cells<T> : &prefetch_linear<T>;
-    kernels.fetch = cells ? &fetch_cells<T> : &fetch_linear<T>;
+void choose_voxel_kernels(const VoxelSource& source, lanes::StageKernels& kernels) {
+    if (source.cells)
+        kernels.prefetch = &prefetch_cells<T>, kernels.fetch = &fetch_cells<T>;
+    else if (source.volume->voxels() <= std::numeric_limits<Word>::max())
+        kernels.prefetch = &prefetch_linear<T, true>, kernels.fetch = &fetch_linear<T, true>;
+    else
+        kernels.prefetch = &prefetch_linear<T, false>, kernels.fetch = &fetch_linear<T, false>;
     kernels.fetch_lit = &fetch_lit_samples<T>;
 }
 
 }  // namespace
 
 void voxel_kernels_of(const VoxelSource& source, lanes::StageKernels& kernels) {
-    kernels.leave_out = &leave_out_empty;
+    kernels.visible_rows = &visible_rows_of;
+    kernels.pass_over = &pass_over_rows;
     kernels.gather_lit = &gather_lit_samples;
     if (source.volume->type == ScalarType::u8)
-        choose_voxel_kernels<std::uint8_t>(source.cells != nullptr, kernels);
+        choose_voxel_kernels<std::uint8_t>(source, kernels);
     else
-        choose_voxel_kernels<std::uint16_t>(source.cells != nullptr, kernels);
+        choose_voxel_kernels<std::uint16_t>(source, kernels);
 }
 
 }  // namespace squint::HWY_NAMESPACE

@@ -47,11 +47,11 @@ KnownRescales known_of(Stage... stage) {
     return all.known;
 }
 
-// How far samples may leave the box that is rendered, in voxels: what rounding V adds up to.
+// How far samples may leave the box that is rendered, in voxels.
 double drift_of(const Plan& plan) {
     const Index3& n = plan.volume->dims;
     const double of_floats = plan.float32 ? static_cast<double>(std::max({n.x, n.y, n.z})) * 0x1p-20 : 0;
-    return of_floats + std::ldexp(static_cast<double>(-plan.location.low[0]), -plan.location.common_fraction);
+    return of_floats + plan.location.drift();
 }
 
 // Blocks that a slab's two ends may lie apart; 0 where one sample classifies it.
@@ -168,7 +168,7 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
         Wire::location,     Wire::direction,  Wire::weight,     Wire::length,    Wire::classification_input,
         Wire::slab_ratio,   Wire::slab_color, Wire::slab_alpha, Wire::lit_color, Wire::color,
         Wire::transparency, Wire::light};
-    if (plan.lit && plan.scene.output.normals) stored.push_back(Wire::normal);
+    if (plan.lit) stored.push_back(Wire::normal);
     if (plan.gradient_from_samples()) stored.push_back(Wire::sample);
     for (const Wire wire : stored) {
         const Format& f = plan.specs[wire].format;
@@ -261,23 +261,28 @@ std::int64_t LaneRenderer::bytes() const {
 
 void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& image,
                                TileStatistics& statistics) const {
-    const auto workspace = std::make_unique<Workspace>();
+    const auto workspace = std::make_unique_for_overwrite<Workspace>();
     Workspace& w = *workspace;
+    if (plan_.lit) w.lit = {};  // lanes behind the last gathered sample are computed, too
     PacketLoop loop(plan_, kernels_, voxels_, empty_ ? &*empty_ : nullptr, w);
+    const bool colors_alone = !plan_.projection_mode && image.channels.size() == 4;
     for (int y = top; y < bottom; y += kSide)
         for (int x = left; x < right; x += kSide) {
             const PacketPlace place{x, y, right, bottom};
             kernels_.set_up(plan_, place, w.rays);
             loop.run();
-            for (int r = 0; r < kRays; ++r) {
-                if (!place.inside(r)) continue;
-                const auto store = [&](const auto& pixel) {
-                    store_pixel(plan_, pixel, place.column(r), place.row(r), image);
-                    statistics.samples += pixel.samples;
-                };
-                plan_.float32 ? store(finished<Real<float>>(w.pixels, r)) : store(loop.pixel(r));
-            }
+            if (colors_alone)
+                kernels_.store_colors(plan_, w.pixels, place, image);
+            else
+                for (int r = 0; r < kRays; ++r) {
+                    if (!place.inside(r)) continue;
+                    const auto store = [&](const auto& pixel) {
+                        store_pixel(plan_, pixel, place.column(r), place.row(r), image);
+                    };
+                    plan_.float32 ? store(finished<Real<float>>(w.pixels, r)) : store(loop.pixel(r));
+                }
             statistics.rays += w.rays.rays, statistics.visited += loop.visited();
+            statistics.samples += loop.samples();
         }
 }
 

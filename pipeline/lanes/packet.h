@@ -44,21 +44,31 @@ struct alignas(64) RayPacket {
     int most_slabs, rays;                      // of any ray; rays that have slabs
 };
 
-/// The same rays for leaving out empty space: about where they are, never used to take a sample.
-struct alignas(64) RayCourse {
-    RealRow first[3], step[3];  // voxels
-    RealRow pace[3];            // steps a voxel
-    Row skippable;              // no sample from this one on can be left out
-    Row free_until;             // samples before this one are known to lie in empty space
-    float margin;               // voxels a sample may lie off its course
+/// About where a packet's rays run together, for leaving out empty space: never used to take a sample.  All
+/// of them, or four groups of 2x2, keep close to a course in their midst.
+struct RayCourse {
+    static constexpr int kMostBeams = 4;
+    static constexpr int kWindow = 16;  // rows looked at together
+    int beams;
+    float first[kMostBeams][3], step[kMostBeams][3];  // blocks, from the lowest corner of the empty space
+    int enough;                    // empty blocks about the corner nearest to a course, for its whole beam
+    int stride, enough_of_stride;  // steps; the same for so many at once
+    int window;                    // row r of those looked at last is window + r:
+    std::uint32_t may_be_seen;     // bit r, where something may be seen
+};
+
+/// Rows one after the other, at most kSteps.
+struct Rows {
+    int first, count;
+    int end() const { return first + count; }
 };
 
 /// One batch: row s of ray r at s * kRays + r.  Row 0 is sample `first`.
 struct alignas(64) Samples {
     Word first = 0;
     Batch cell[3], weight[3];
-    Batch location[3];      // where gradients are made of samples
-    Batch place;            // of the cell among the cells in memory, or below 0 (see VoxelSource)
+    Batch location[3];  // where gradients are made of samples
+    Batch place;  // of the cell in memory (VoxelSource): among the cells, or below 0; or of its lowest voxel
     Batch pair[4];          // corners by pairs along x: the lower in the low half; y fastest
     Batch input;            // classification input
     Batch length;           // of the slab, in steps
@@ -74,7 +84,7 @@ struct alignas(64) LitSamples {
     Batch beside[2][3][2];           // scalars one voxel off along each axis: behind, ahead
     Batch half[kMostHalves][3], view[3];
     Batch gradient[3];  // raw; the sum of a slab's two ends
-    Batch normal[3];    // where it is asked for
+    Batch normal[3];
     Batch color[3], alpha;
 };
 

@@ -11,6 +11,7 @@
 #include <cstring>
 #include <iterator>
 #include <limits>
+#include <numeric>
 
 namespace squint::lanes {
 
@@ -82,6 +83,7 @@ class PacketLoop {
         if (notes_)
             std::fill_n(w_.notes.pixel, kRays, Pixel<std::int64_t>{}),
                 std::fill_n(w_.notes.met, kRays, false);
+        if (w_.rays.most_slabs == 0) return;
         if (empty_) kernels_.set_course(plan_, *empty_, w_.rays, w_.course);
         if (backwards_)
             run_backwards();
@@ -100,6 +102,11 @@ class PacketLoop {
         return finished<std::int64_t>(w_.pixels, r, notes_ ? w_.notes.pixel[r] : Pixel<std::int64_t>{});
     }
 
+    /// Slabs composited, or projected; a ray outside the tile has none.
+    std::int64_t samples() const {
+        const Row& counted = plan_.projection_mode ? w_.rays.slabs : w_.pixels.samples;
+        return std::accumulate(std::begin(counted.v), std::end(counted.v), std::int64_t{0});
+    }
     /// Slabs of the packet, of all its rays, that went through the stages.
     std::int64_t visited() const { return visited_; }
 
@@ -127,62 +134,59 @@ class PacketLoop {
     }
 
     void run_forwards() {
+        Rows rows = next_rows(0);
+        kernels_.pass_over(w_.rays, 0, rows.first, w_.pixels);
         bool carried = false;  // the sample behind the last slab is known: the next batch's row 0
-        for (int k = 0; k < w_.rays.most_slabs;) {
-            if (const int skip = leave_out(k); skip > 0) {
-                k += skip, carried = false;
-                continue;
-            }
-            batch(k, std::min(kSteps, w_.rays.most_slabs - k), carried);
-            carried = plan_.needs_back;
-            k += kSteps;
+        while (rows.count > 0) {
+            const Rows next = next_rows(rows.end());
+            batch(rows, next, carried);
             if (!any_active(w_.pixels)) return;
+            kernels_.pass_over(w_.rays, rows.end(), next.first, w_.pixels);
+            carried = plan_.needs_back && next.first == rows.end();
+            rows = next;
         }
     }
 
     void run_backwards() {
         for (int end = w_.rays.most_slabs; end > 0; end -= kSteps) {
             const int k = std::max(0, end - kSteps);
-            batch(k, end - k, false);
+            batch({k, end - k}, {k, 0}, false);
         }
     }
 
-    // Slabs that composite nothing; they count as composited, as in the model.
-    int leave_out(int k) {
-        return empty_ ? kernels_.leave_out(*empty_, w_.rays, plan_.volume->dims, k, w_.rays.most_slabs - k,
-                                           w_.course, w_.pixels)
-                      : 0;
+    // Slabs between a batch and the next composite nothing; they count as composited, as in the model.
+    Rows next_rows(int k) {
+        if (empty_) return kernels_.visible_rows(*empty_, w_.rays, k, w_.course);
+        return {k, std::min(kSteps, w_.rays.most_slabs - k)};
     }
 
     Samples& here() { return w_.samples[current_]; }
 
-    int samples_for(int k) const {
-        return std::min(kSteps, w_.rays.most_slabs - k) + (plan_.needs_back ? 1 : 0);
-    }
-
-    // Slabs k to k + steps through all stages.
-    void batch(int k, int steps, bool carried) {
-        const int from = carried ? 1 : 0, to = steps + (plan_.needs_back ? 1 : 0);
-        if (located_ == k) {
+    // A batch's slabs through all stages.  `next`: the batch behind it, no rows where that is not known.
+    void batch(const Rows& rows, const Rows& next, bool carried) {
+        const int back = plan_.needs_back ? 1 : 0;
+        const int from = carried ? 1 : 0, to = rows.count + back;
+        if (located_ == rows.first) {
             current_ = 1 - current_;
             if (carried) carry(w_.samples[1 - current_], here());
         } else {
             if (carried) carry(here(), here());
-            locate(here(), k, from, to);
+            locate(here(), rows.first, from, to);
         }
         Samples& s = here();
-        if (!backwards_) look_ahead(k + kSteps);
+        look_ahead(next, next.first == rows.end() ? back : 0);
         kernels_.fetch(voxels_, from, to, s);
         kernels_.interpolate(plan_, from, to, s);
-        visited_ += steps * w_.rays.rays;
+        visited_ += rows.count * w_.rays.rays;
+        last_count_ = rows.count;
         if (plan_.projection_mode) {
-            kernels_.project(w_.rays, steps, s, w_.projection);
+            kernels_.project(w_.rays, rows.count, s, w_.projection);
             return;
         }
-        kernels_.classify(plan_, steps, s);
-        const int lit = plan_.lit ? light(steps) : 0;
+        kernels_.classify(plan_, rows.count, s);
+        const int lit = plan_.lit ? light(rows.count) : 0;
         if (notes_) w_.notes.samples_before = w_.pixels.samples;
-        kernels_.composite(plan_, w_.rays, steps, s, w_.pixels, w_.notes.between);
+        kernels_.composite(plan_, w_.rays, rows.count, s, w_.pixels, w_.notes.between);
         if (notes_) note(lit);
     }
 
@@ -192,18 +196,18 @@ class PacketLoop {
         kernels_.prefetch(voxels_, from, to, s);
     }
 
-    // Locations of the batch at k, and its voxels on their way from memory while this batch computes.
-    void look_ahead(int k) {
+    // Locations of the batch to come, and its voxels on their way from memory while this batch computes.
+    void look_ahead(const Rows& next, int from) {
         located_ = -1;
-        if (k >= w_.rays.most_slabs) return;
-        locate(w_.samples[1 - current_], k, plan_.needs_back ? 1 : 0, samples_for(k));
-        located_ = k;
+        if (next.count == 0) return;
+        locate(w_.samples[1 - current_], next.first, from, next.count + (plan_.needs_back ? 1 : 0));
+        located_ = next.first;
     }
 
     // One batch's last row becomes the next one's first.
     void carry(const Samples& from, Samples& to) const {
-        const auto move = [](const Batch& a, Batch& b) {
-            std::memmove(b.v, a.v + kSteps * kRays, sizeof(Word) * kRays);
+        const auto move = [this](const Batch& a, Batch& b) {
+            std::memmove(b.v, a.v + last_count_ * kRays, sizeof(Word) * kRays);
         };
         move(from.input, to.input), move(from.length, to.length);
         for (int a = 0; a < 3; ++a) move(from.cell[a], to.cell[a]), move(from.weight[a], to.weight[a]);
@@ -214,7 +218,8 @@ class PacketLoop {
     int light(int steps) {
         Samples& s = here();
         LitSamples& lit = w_.lit;
-        const int count = kernels_.gather_lit(plan_, w_.rays, w_.pixels, steps, s, lit);
+        if (!backwards_) kernels_.hide(plan_, w_.rays, w_.pixels, steps, s);
+        const int count = kernels_.gather_lit(plan_, w_.rays, steps, s, lit);
         if (count == 0) return 0;
         if (plan_.gradient_from_samples())
             sample_beside(count);
@@ -278,7 +283,8 @@ class PacketLoop {
     bool backwards_;
     bool notes_;  // depth or normals are asked for
     int current_ = 0;
-    int located_ = -1;  // first slab of the batch whose locations stand in the other buffer
+    int located_ = -1;    // first slab of the batch whose locations stand in the other buffer
+    int last_count_ = 0;  // slabs of the last batch
     std::int64_t visited_ = 0;
 };
 

@@ -1,6 +1,7 @@
 #include "core/camera.h"
 
 #include "core/error.h"
+#include "core/rays.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -292,6 +293,22 @@ TEST(Intersect, TheMiddleOfEveryChordLiesInTheBox) {
         ASSERT_TRUE(on_face(inside.last)) << "ray " << i << " of seed 11";
     }
     EXPECT_GT(hits, 20000);
+}
+
+TEST(Divisor, GivesTheQuotient) {
+    std::mt19937_64 random(3);
+    const auto any = [&] {
+        const double mantissa = static_cast<double>(random() >> 11) * 0x1p-53 - 0.5;
+        return std::ldexp(mantissa, static_cast<int>(random() % 2100) - 1050);
+    };
+    for (int i = 0; i < 100'000; ++i) {
+        // Powers of two, beyond those whose inverse is a double too, and others.
+        const double x = any(), by = i % 2 ? std::ldexp(1.0, i % 2098 - 1074) : std::abs(any());
+        if (by == 0) continue;
+        const double expected = x / by, found = x / HWY_NAMESPACE::Divisor(by);
+        ASSERT_EQ(std::bit_cast<std::uint64_t>(expected), std::bit_cast<std::uint64_t>(found))
+            << x << " / " << by;
+    }
 }
 
 }  // namespace

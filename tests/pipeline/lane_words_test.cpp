@@ -24,9 +24,9 @@ namespace {
 
 // The integers' overloads; those of lanes are found by their arguments.
 using squint::absolute, squint::affine, squint::bit_length, squint::blend, squint::clamp, squint::floor_shift,
-    squint::gather, squint::max, squint::min, squint::quantise, squint::quotient, squint::select,
-    squint::shift_by, squint::shift_left, squint::vector_length, squint::wide_product, squint::wide_sum,
-    squint::widen;
+    squint::gather, squint::max, squint::min, squint::quantise, squint::quantised_product, squint::quotient,
+    squint::select, squint::shift_by, squint::shift_left, squint::vector_length, squint::wide_product,
+    squint::wide_sum, squint::widen;
 
 /// Draws operands, runs one operation on lanes and on integers, and keeps the first difference of each.
 template <class T, KnownRescales K = KnownRescales::nothing>
@@ -185,6 +185,21 @@ void compare_wide(Comparison<T>& compare) {
         [&](auto x, auto y, auto z) { return quotient(absolute(wide_product(x, y)), widen(z), to); });
 }
 
+/// Numbers from 0 to 1 of 15 fraction bits, both ends included; half of them of few significant bits, whose
+/// products are often halves.
+void compare_unit_products(std::vector<std::string>& wrong) {
+    Comparison<std::int32_t, KnownRescales::unit_products> compare(wrong);
+    const Rescale to(30, Spec{{1, 15, false}, Rounding::rnd_conv, Overflow::sat});
+    constexpr std::int64_t kOne = 1 << 15;
+    const auto draw = [&](int) {
+        if (compare.between(0, 1)) return compare.between(0, kOne);
+        const std::int64_t bits = compare.between(0, 15);
+        return compare.between(0, kOne >> bits) << bits;
+    };
+    for (int round = 0; round < 100'000 && wrong.empty(); ++round)
+        compare("unit product", draw, [&](auto x, auto y, auto) { return quantised_product(x, y, to); });
+}
+
 template <class T>
 void compare_words(std::vector<std::string>& wrong) {
     Comparison<T> compare(wrong);
@@ -304,6 +319,7 @@ void compare_float_words(std::vector<std::string>& wrong) {
 void compare_all_words(std::vector<std::string>& wrong) {
     compare_words<std::int32_t>(wrong);
     compare_words<std::int64_t>(wrong);
+    compare_unit_products(wrong);
     compare_float_words(wrong);
 }
 

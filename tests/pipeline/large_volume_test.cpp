@@ -156,7 +156,7 @@ TEST_F(LargeVolume, WithoutAClipBoxItsEmptyPartIsSkippedUnread) {
         EXPECT_EQ(picture_hash(found.image), hash);
     }
     EXPECT_LE(resident_bytes() - before,
-              std::int64_t{1} << 30);  // 5 bytes for each of 68 million blocks, and copies
+              std::int64_t{1} << 30);  // 6 bytes for each of 68 million blocks, and copies
     RenderOptions model;
     model.path = Path::model;
     EXPECT_EQ(picture_hash(render(plan, model).image), hash);
