@@ -87,10 +87,10 @@ float farthest_off(const lanes::RayPacket& rays, const float (*first)[kRays], co
     auto off = hn::Zero(df);
     for (int a = 0; a < 3; ++a) {
         lanes::RealRow middle, middle_step;
-        for (int r = 0; r < kRays; ++r) {
-            const int beam = course.beams == 1 ? 0 : beam_of(r);
-            middle.v[r] = course.first[beam][a], middle_step.v[r] = course.step[beam][a];
-        }
+        std::fill_n(middle.v, kRays, course.first[0][a]);
+        std::fill_n(middle_step.v, kRays, course.step[0][a]);
+        for (int r = 0; course.beams > 1 && r < kRays; ++r)
+            middle.v[r] = course.first[beam_of(r)][a], middle_step.v[r] = course.step[beam_of(r)][a];
         for (int r = 0; r < kRays; r += static_cast<int>(hn::Lanes(d))) {
             const auto begin = hn::Sub(hn::Load(df, first[a] + r), hn::Load(df, middle.v + r)),
                        apart = hn::Sub(hn::Load(df, step[a] + r), hn::Load(df, middle_step.v + r));
