@@ -108,7 +108,7 @@ std::vector<std::string> view(bool lit, bool perspective, const std::string& met
 }
 
 TEST_F(LargeVolume, TheFarCornerIsRenderedAsAVolumeOfItsOwn) {
-    const std::int64_t before = resident_bytes();
+    [[maybe_unused]] const std::int64_t before = resident_bytes();
     const std::shared_ptr<const Volume> far = large(), near = corner();
     EXPECT_EQ(far->largest, near->largest);
     EXPECT_TRUE(far->mapped);
