@@ -104,8 +104,9 @@ void add_render(CLI::App& app, RenderArguments& a) {
     verb.add_flag("--error", a.error,
                   "Measure the error against the same scene in double, and each stage's share");
     verb.add_flag("--reference", a.reference, "Measure the error against the exact integral along each ray");
-    verb.add_flag("--audit", a.options.audit,
-                  "Count what every wire carried: least, greatest, inexact, underflowed to zero, saturated, wrapped");
+    verb.add_flag(
+        "--audit", a.options.audit,
+        "Count what every wire carried: least, greatest, inexact, underflowed to zero, saturated, wrapped");
     verb.add_option("--threads", a.options.threads, "Threads; default: one a processor")
         ->check(CLI::Range(1, 4096))
         ->type_name("N");

@@ -31,17 +31,20 @@ struct Ray {
 /// A camera with nothing left open.  ray() uses + - * / sqrt only: same bits everywhere.
 struct Camera {
     Projection projection = Projection::orthographic;
-    Vec3 eye, center, view, right, up;  // view, right, up are unit and orthogonal; view points into the picture
-    double half_height = 1;             // orthographic: world units; perspective: tan(fov_y / 2)
-    int width = 1, height = 1;          // pixels
+    Vec3 eye, center;
+    Vec3 view, right, up;       // unit and orthogonal; view points into the picture
+    double half_height = 1;     // orthographic: world units; perspective: tan(fov_y / 2)
+    int width = 1, height = 1;  // pixels
 
     Ray ray(int column, int row) const;  // through the pixel's centre; row 0 is the top
 };
 
 /// Throws InputError: eye equals center, up parallel to the view, height or fov_y out of range.
-Camera make_camera(const CameraSettings& settings, const Volume& volume, int width, int height, int frame = 0);
+Camera make_camera(const CameraSettings& settings, const Volume& volume, int width, int height,
+                   int frame = 0);
 
-/// The part of a ray inside a box [low, high], as distances along it: empty when first >= last (a chord of zero is empty).
+/// The part of a ray inside a box [low, high], as distances along it: empty when first >= last (a chord of
+/// zero is empty).
 struct Interval {
     double first = 0, last = 0;
     bool empty() const { return !(first < last); }

@@ -1,4 +1,5 @@
-// Errors that a user can mend: a file, a flag or a scene that cannot be used.  Everything else is a bug (assert).
+// Errors that a user can mend: a file, a flag or a scene that cannot be used.  Everything else is a bug
+// (assert).
 #pragma once
 
 #include <stdexcept>

@@ -1,22 +1,22 @@
-// exp, log, pow, sin, cos and friends with the same bits on every CPU: only + - * / sqrt, compiled with -ffp-contract=off.
-// libm's differ in the last bit with the CPU's features (CONVENTIONS.md, "Numbers").
+// exp, log, pow, sin, cos and friends with the same bits on every CPU: only + - * / sqrt, compiled with
+// -ffp-contract=off. libm's differ in the last bit with the CPU's features (CONVENTIONS.md, "Numbers").
 #pragma once
 
 #include <span>
 
 namespace squint::portable {
 
-double exp(double x);    // relative error below 2^-50 for |x| < 700; 0 and infinity beyond
-double expm1(double x);  // relative error below 2^-50
-double log(double x);    // x > 0; relative error below 2^-50
-double log1p(double x);  // x > -1
+double exp(double x);                      // relative error below 2^-50 for |x| < 700; 0 and infinity beyond
+double expm1(double x);                    // relative error below 2^-50
+double log(double x);                      // x > 0; relative error below 2^-50
+double log1p(double x);                    // x > -1
 double pow(double base, double exponent);  // base >= 0
-double sin(double x);    // |x| < 1e6
+double sin(double x);                      // |x| < 1e6
 double cos(double x);
 double tan(double x);
 
-/// Of many numbers, as many at once as the CPU has lanes: bit for bit what each alone gives.  `result` is as long as `x` and
-/// may be the same numbers.
+/// Of many numbers, as many at once as the CPU has lanes: bit for bit what each alone gives.  `result` is as
+/// long as `x` and may be the same numbers.
 void expm1_each(std::span<const double> x, std::span<double> result);
 void log1p_each(std::span<const double> x, std::span<double> result);
 

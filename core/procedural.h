@@ -15,18 +15,19 @@ namespace squint {
 /// A scalar field over the unit cube [0,1]^3, with values in [0,1] of full scale.
 struct ProceduralField {
     std::string name;
-    std::string description;                      // one line for help
-    int default_bits = 12;                        // 8 or 12
-    std::int64_t default_size = 128;              // voxels a side
-    std::function<double(const Vec3&)> value;     // in [0,1]
-    std::function<Vec3(const Vec3&)> gradient;    // exact derivative of `value`
+    std::string description;                    // one line for help
+    int default_bits = 12;                      // 8 or 12
+    std::int64_t default_size = 128;            // voxels a side
+    std::function<double(const Vec3&)> value;   // in [0,1]
+    std::function<Vec3(const Vec3&)> gradient;  // exact derivative of `value`
 };
 
 /// phantom, sphere, marschner_lobb, shells, ramp, constant, fog, polynomial.
 const std::vector<ProceduralField>& procedural_fields();
 const ProceduralField* find_procedural(std::string_view name);  // null if unknown
 
-/// Scalars round(value * (2^bits - 1)) at voxel centres (x / (dims.x - 1), ...).  Uses only portable arithmetic: same bits everywhere.
+/// Scalars round(value * (2^bits - 1)) at voxel centres (x / (dims.x - 1), ...).  Uses only portable
+/// arithmetic: same bits everywhere.
 Volume make_procedural(const ProceduralField& field, Index3 dims, int bits, const Vec3& spacing = {1, 1, 1});
 
 }  // namespace squint

@@ -20,7 +20,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
-// ------------------------------------------------------------------------------------------------ doubles
+// ----------------------------------------------------------------------------------------- doubles
 
 HWY_INLINE double choose(bool condition, double yes, double no) {
     return condition ? yes : no;
@@ -106,7 +106,7 @@ HWY_INLINE D greater(D a, D b) {
     return choose(a < b, b, a);
 }
 
-// ------------------------------------------------------------------------------------------------ rays
+// -------------------------------------------------------------------------------------------- rays
 
 template <class D>
 using RealVector = std::array<D, 3>;

@@ -1,5 +1,5 @@
-// The transfer function: control points in the file's units -> E entries over the scalar range, which *are* the function
-// for every method and for the reference (CONVENTIONS.md, "Scalars and transfer function").
+// The transfer function: control points in the file's units -> E entries over the scalar range, which *are*
+// the function for every method and for the reference (CONVENTIONS.md, "Scalars and transfer function").
 #pragma once
 
 #include "core/vector.h"
@@ -34,17 +34,21 @@ struct TransferFunction {
     double alpha_at(double value) const;
 };
 
-inline constexpr double kLargestTranslucentAlpha = 1 - 1.0 / 4096;  // every alpha but exactly 1 is capped here
+/// Every alpha but exactly 1 is capped here.
+inline constexpr double kLargestTranslucentAlpha = 1 - 1.0 / 4096;
 
 /// One entry of the sampled function.
 struct Entry {
     Vec3 color{0, 0, 0};
-    double alpha = 0;      // per unit_distance, as sampled; exactly 1 when opaque
-    double extinction = 0; // tau = -ln(1 - min(alpha, kLargestTranslucentAlpha)) / unit_distance, per world unit
-    bool opaque = false;   // alpha was exactly 1
+    double alpha = 0;  // per unit_distance, as sampled; exactly 1 when opaque
+    /// tau = -ln(1 - min(alpha, kLargestTranslucentAlpha)) / unit_distance, per world unit.
+    double extinction = 0;
+    bool opaque = false;  // alpha was exactly 1
+    bool is_visible() const { return extinction > 0 || opaque; }
 };
 
-/// The sampled function.  Entry i stands at scalar i * scalars_per_entry; between entries extinction and colour are linear.
+/// The sampled function.  Entry i stands at scalar i * scalars_per_entry; between entries extinction and
+/// colour are linear.
 struct Entries {
     std::vector<Entry> entry;
     double scalars_per_entry = 1;
@@ -55,7 +59,8 @@ struct Entries {
     bool any_opaque() const;
 };
 
-/// Checks points (at least one each, finite, ascending, colours and alphas in [0,1], unit_distance > 0) and throws InputError.
+/// Checks points (at least one each, finite, ascending, colours and alphas in [0,1], unit_distance > 0) and
+/// throws InputError.
 void check(const TransferFunction& function);
 
 /// Samples the function over [0, volume.largest_representable()].  Uses portable log: same bits everywhere.

@@ -1,4 +1,5 @@
-// A volume: unsigned integer scalars on a regular, axis-aligned grid in world space.  Knows no bits of the pipeline.
+// A volume: unsigned integer scalars on a regular, axis-aligned grid in world space.  Knows no bits of the
+// pipeline.
 #pragma once
 
 #include "core/vector.h"
@@ -19,23 +20,25 @@ struct VoxelRun {
     std::int64_t first = 0, end = 0;
 };
 
-/// Scalars are levels: stored value minus the smallest the type or a declared window allows (CONVENTIONS.md, "Scalars").
-/// A volume is immutable and cheap to copy; its voxels are shared, in memory or mapped from a file.
+/// Scalars are levels: stored value minus the smallest the type or a declared window allows (CONVENTIONS.md,
+/// "Scalars"). A volume is immutable and cheap to copy; its voxels are shared, in memory or mapped from a
+/// file.
 struct Volume {
-    Index3 dims{0, 0, 0};           // voxels along x, y, z; x runs fastest
-    Vec3 spacing{1, 1, 1};          // world units between voxel centres
-    Vec3 origin{0, 0, 0};           // world position of the first voxel's centre
+    Index3 dims{0, 0, 0};   // voxels along x, y, z; x runs fastest
+    Vec3 spacing{1, 1, 1};  // world units between voxel centres
+    Vec3 origin{0, 0, 0};   // world position of the first voxel's centre
     ScalarType type = ScalarType::u8;
-    std::shared_ptr<const void> data;  // dims.x * dims.y * dims.z scalars of `type`, little-endian; 64 more bytes can be read
-    bool mapped = false;            // they lie in a mapped file, which the system reads and forgets as it likes
-    std::vector<VoxelRun> zeros;    // known to be 0 unread: what a sparse file never wrote; in order, apart
-    std::uint32_t smallest = 0;     // least and greatest scalar in the data
+    /// dims.x * dims.y * dims.z scalars of `type`, little-endian; 64 more bytes can be read.
+    std::shared_ptr<const void> data;
+    bool mapped = false;          // they lie in a mapped file, which the system reads and forgets as it likes
+    std::vector<VoxelRun> zeros;  // known to be 0 unread: what a sparse file never wrote; in order, apart
+    std::uint32_t smallest = 0;   // least and greatest scalar in the data
     std::uint32_t largest = 0;
-    int scalar_bits = 8;            // I: integer bits that hold every scalar of the declared range
-    double value_scale = 1;         // file's value = value_scale * scalar + value_offset (HU where declared)
+    int scalar_bits = 8;     // I: integer bits that hold every scalar of the declared range
+    double value_scale = 1;  // file's value = value_scale * scalar + value_offset (HU where declared)
     double value_offset = 0;
-    std::string name;               // for messages: a path or a procedural name
-    std::string content_hash;       // of dims, type and voxels: names the data wherever it lies
+    std::string name;          // for messages: a path or a procedural name
+    std::string content_hash;  // of dims, type and voxels: names the data wherever it lies
 
     std::int64_t voxels() const { return dims.x * dims.y * dims.z; }
     std::size_t scalar_bytes() const { return type == ScalarType::u8 ? 1 : 2; }
@@ -48,8 +51,9 @@ struct Volume {
     }
     /// Whether voxels [first, end) are known to be 0 without a look at them.
     bool known_zero(std::int64_t first, std::int64_t end) const {
-        const auto after = std::upper_bound(zeros.begin(), zeros.end(), first,
-                                            [](std::int64_t voxel, const VoxelRun& run) { return voxel < run.first; });
+        const auto after =
+            std::upper_bound(zeros.begin(), zeros.end(), first,
+                             [](std::int64_t voxel, const VoxelRun& run) { return voxel < run.first; });
         return after != zeros.begin() && end <= (after - 1)->end;
     }
     double smallest_spacing() const { return std::min(spacing.x, std::min(spacing.y, spacing.z)); }

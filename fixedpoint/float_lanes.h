@@ -121,7 +121,7 @@ HWY_INLINE bool any_positive(Lanes<float, K> x) {
     return any(Lanes<float, K>{hn::Zero(hn::ScalableTag<float>())} < x);
 }
 
-// ------------------------------------------------------------------------------------------------ tables
+// ------------------------------------------------------------------------------------------ tables
 
 template <KnownRescales K>
 HWY_INLINE Lanes<float, K> gather(const Table& table, Lanes<float, K> row, int column) {
@@ -171,7 +171,7 @@ HWY_INLINE std::array<Lanes<float, K>, 4> gather_cell(const CellTable& table, La
     return gather_two_cells(table, row, column)[0];
 }
 
-// ------------------------------------------------------------------------------------------------ memory
+// ------------------------------------------------------------------------------------------ memory
 
 /// A float's bits are its word in the buffers between stages.
 template <KnownRescales K>

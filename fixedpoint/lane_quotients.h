@@ -51,26 +51,25 @@ HWY_INLINE Lanes<std::int64_t, K> vector_length(const std::array<Lanes<std::int6
     const auto squares = shift_left(v[0] * v[0] + v[1] * v[1] + v[2] * v[2], 2 * guard);
     return {hn::ConvertTo(d, hn::Sqrt(lanes_detail::to_floats(squares)))};
 }
-/// The sum of squares fills 32 bits, unsigned; its root is taken in doubles, half the lanes at a time.
+/// guard <= 8: the sum of squares fills 32 bits, unsigned, and a root 24.  In floats it is 1.1 off at most;
+/// what its square leaves of the sum fits 32 bits again, and tells the floor.
 template <KnownRescales K>
 HWY_INLINE Lanes<std::int32_t, K> vector_length(const std::array<Lanes<std::int32_t, K>, 3>& v, int guard) {
     const hn::ScalableTag<std::int32_t> d;
-    const auto squares = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).v;
-    const double factor = power_of_two<double>(2 * guard);
-#if HWY_TARGET == HWY_SCALAR
-    const auto sum = static_cast<std::uint32_t>(hn::GetLane(squares));
-    return {hn::Set(d, static_cast<std::int32_t>(std::sqrt(factor * static_cast<double>(sum))))};
-#else
-    const hn::Half<decltype(d)> half;
-    const hn::ScalableTag<double> wide;
-    const auto root = [&](auto part) {
-        // Unsigned to double: the sign's weight is put right.
-        const auto x = hn::PromoteTo(wide, part);
-        const auto sum = hn::Add(x, hn::IfThenElseZero(hn::Lt(x, hn::Zero(wide)), hn::Set(wide, 0x1p32)));
-        return hn::DemoteTo(half, hn::Sqrt(hn::Mul(sum, hn::Set(wide, factor))));
-    };
-    return {hn::Combine(d, root(hn::UpperHalf(half, squares)), root(hn::LowerHalf(half, squares)))};
-#endif
+    const hn::ScalableTag<float> df;
+    const auto one = hn::Set(d, 1), zero = hn::Zero(d);
+    const Lanes<std::int32_t, K> squares = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+    const auto as_signed = hn::ConvertTo(df, squares.v);
+    const auto sum =
+        hn::Add(as_signed, hn::IfThenElseZero(hn::Lt(as_signed, hn::Zero(df)), hn::Set(df, 0x1p32F)));
+    const auto root = hn::Mul(hn::Sqrt(sum), hn::Set(df, power_of_two<float>(guard)));
+    const Lanes<std::int32_t, K> estimate{hn::ConvertTo(d, root)};
+    const auto rest = (shift_left(squares, 2 * guard) - estimate * estimate).v;
+    const auto twice = hn::Add(estimate.v, estimate.v);
+    auto length = estimate.v;
+    length = hn::IfThenElse(hn::Lt(rest, zero), hn::Sub(length, one), length);
+    length = hn::IfThenElse(hn::Lt(rest, hn::Min(zero, hn::Sub(one, twice))), hn::Sub(length, one), length);
+    return {hn::IfThenElse(hn::Gt(rest, twice), hn::Add(length, one), length)};
 }
 
 /// The lowest bits of a product, whatever its factors: all 32 or 64 of them.
@@ -91,41 +90,68 @@ HWY_INLINE Lanes<std::int64_t, K> low_product(Lanes<std::int64_t, K> a, Lanes<st
     return {hn::BitCast(d, hn::Add(product(x, y), hn::ShiftLeft<32>(cross)))};
 }
 
-/// quantise.h's quotient.  A floating-point estimate of the floor, off by one at most, is corrected by the
-/// exact rest. 32-bit lanes: results of at most 22 bits, denominators below 2^29 (pipeline/plan.cpp checks).
-/// Saturating wires only.
+namespace lanes_detail {
+/// An estimate of scaled / denominator, a whole number off by one at most, is put right by its exact rest.
+template <class T, KnownRescales K>
+HWY_INLINE Lanes<T, K> corrected(Lanes<T, K> q, Lanes<T, K> scaled, Lanes<T, K> denominator,
+                                 const Rescale& to) {
+    const hn::ScalableTag<T> d;
+    const auto one = hn::Set(d, T{1}), zero = hn::Zero(d);
+    const auto rest = (scaled - low_product(q, denominator)).v, below = denominator.v;
+    auto down = hn::Lt(rest, zero), up = hn::Not(hn::Lt(rest, below));
+    if (to.rounding == Rounding::rnd || to.rounding == Rounding::rnd_conv) {
+        // Halves go up, or from the odd one to its neighbour.
+        const auto twice = hn::Add(rest, rest), odd = hn::And(q.v, one);
+        const bool to_even = to.rounding == Rounding::rnd_conv;
+        up = hn::Gt(hn::Add(twice, to_even ? odd : one), below);
+        down = hn::Gt(hn::Sub(to_even ? odd : zero, twice), below);
+    }
+    q.v = hn::IfThenElse(up, hn::Add(q.v, one), q.v);
+    return {hn::IfThenElse(down, hn::Sub(q.v, one), q.v)};
+}
+/// The integer nearest to x, |x| <= 2^22 (floats) or 2^51: the sum with 1.5 times the power of two whose last
+/// bit is one has it in its own last bits.
+template <class T, class V>
+HWY_INLINE auto nearest_whole(V x) {
+    const hn::ScalableTag<T> d;
+    const auto whole = hn::Set(hn::DFromV<V>(), FloatOf<T>(sizeof(T) == 4 ? 0x1.8p23 : 0x1.8p52));
+    return hn::Sub(hn::BitCast(d, hn::Add(x, whole)), hn::BitCast(d, whole));
+}
+template <class T, KnownRescales K, std::size_t N>
+HWY_INLINE std::array<Lanes<T, K>, N> quotients(const std::array<Lanes<T, K>, N>& numerators,
+                                                Lanes<T, K> denominator, const Rescale& to) {
+    using F = lanes_detail::FloatOf<T>;
+    const hn::ScalableTag<F> df;
+    const bool to_nearest = to.rounding == Rounding::rnd || to.rounding == Rounding::rnd_conv;
+    const auto factor = hn::Set(df, static_cast<F>(power_of_two<double>(-to.shift)));
+    const auto inverse = hn::Div(factor, lanes_detail::to_floats(denominator));
+    const auto beyond = hn::Set(df, static_cast<F>(to.highest + 1));
+    std::array<Lanes<T, K>, N> results;
+    for (std::size_t i = 0; i < N; ++i) {
+        const auto ratio = hn::Min(hn::Mul(lanes_detail::to_floats(numerators[i]), inverse), beyond);
+        const Lanes<T, K> estimate{
+            nearest_whole<T>(to_nearest ? ratio : hn::Sub(ratio, hn::Set(df, F{0.5})))};
+        const Lanes<T, K> q =
+            lanes_detail::corrected(estimate, shift_left(numerators[i], -to.shift), denominator, to);
+        results[i] = clamp(q, limit_in_lanes<T, K>(to.lowest), limit_in_lanes<T, K>(to.highest));
+    }
+    return results;
+}
+}  // namespace lanes_detail
+
+/// words.h's.  32-bit lanes: results of at most 22 bits, denominators below 2^29 (pipeline/plan.cpp checks).
+/// Four roundings of floats are one at most of such a result.  Saturating wires only.
 template <class T, KnownRescales K>
 HWY_INLINE Lanes<T, K> quotient(Lanes<T, K> numerator, Lanes<T, K> denominator, const Rescale& to) {
-    using F = lanes_detail::FloatOf<T>;
-    const hn::ScalableTag<T> d;
-    const hn::ScalableTag<F> df;
-    const auto one = hn::Set(d, T{1}), zero = hn::Zero(d);
-    const Lanes<T, K> scaled = shift_left(numerator, -to.shift);
-    const auto factor = hn::Set(df, static_cast<F>(power_of_two<double>(-to.shift)));
-    const auto ratio =
-        hn::Div(hn::Mul(lanes_detail::to_floats(numerator), factor), lanes_detail::to_floats(denominator));
-    const auto beyond = hn::Set(df, static_cast<F>(to.highest + 1));
-    Lanes<T, K> q{hn::ConvertTo(d, hn::Min(ratio, beyond))};
-    Lanes<T, K> rest = scaled - low_product(q, denominator);
-    const auto below = hn::Lt(rest.v, zero);
-    q.v = hn::Sub(q.v, hn::IfThenElseZero(below, one));
-    rest.v = hn::Add(rest.v, hn::IfThenElseZero(below, denominator.v));
-    const auto above = hn::Not(hn::Lt(rest.v, denominator.v));
-    q.v = hn::Add(q.v, hn::IfThenElseZero(above, one));
-    rest.v = hn::Sub(rest.v, hn::IfThenElseZero(above, denominator.v));
-    const auto twice = hn::Add(rest.v, rest.v);
-    if (to.rounding == Rounding::rnd)
-        q.v = hn::Add(q.v, hn::IfThenZeroElse(hn::Lt(twice, denominator.v), one));
-    if (to.rounding == Rounding::rnd_conv) {
-        const auto up = hn::Or(hn::Gt(twice, denominator.v),
-                               hn::And(hn::Eq(twice, denominator.v), hn::Ne(hn::And(q.v, one), zero)));
-        q.v = hn::Add(q.v, hn::IfThenElseZero(up, one));
-    }
-    return clamp(q, limit_in_lanes<T, K>(to.lowest), limit_in_lanes<T, K>(to.highest));
+    return lanes_detail::quotients(std::array{numerator}, denominator, to)[0];
+}
+template <class T, KnownRescales K>
+HWY_INLINE std::array<Lanes<T, K>, 3> quotients(const std::array<Lanes<T, K>, 3>& numerators,
+                                                Lanes<T, K> denominator, const Rescale& to) {
+    return lanes_detail::quotients(numerators, denominator, to);
 }
 
-// ------------------------------------------------------------------------------------------------ wide
-// numbers
+// ------------------------------------------------------------------------------------ wide numbers
 
 /// words.h's Wide of 32-bit lanes: doubles, the lower half of the lanes and the upper one.
 template <KnownRescales K>

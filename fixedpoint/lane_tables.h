@@ -116,6 +116,13 @@ HWY_INLINE std::array<std::array<Lanes<std::int32_t, K>, 4>, 2> load_neighbours(
                third = halves_of<K>(words[2]), fourth = halves_of<K>(words[3]);
     return {{{first[0], first[1], second[0], second[1]}, {third[0], third[1], fourth[0], fourth[1]}}};
 }
+/// Of four 16-bit words as two pairs: the middle two.
+template <class V>
+HWY_INLINE V inner_pair(V lower, V upper) {
+    const hn::ScalableTag<std::int32_t> d;
+    const hn::RebindToUnsigned<decltype(d)> du;
+    return hn::Or(hn::BitCast(d, hn::ShiftRight<16>(hn::BitCast(du, lower))), hn::ShiftLeft<16>(upper));
+}
 /// Pairs of unsigned 16-bit words as the signed ones that blend_pairs multiplies: less 2^15 each, unless all
 /// are below that.
 template <bool kBelow15Bits>

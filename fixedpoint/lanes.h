@@ -110,6 +110,7 @@ HWY_INLINE Lanes<T, K> clamp(Lanes<T, K> x, Lanes<T, K> low, Lanes<T, K> high) {
 }
 template <class T, KnownRescales K>
 HWY_INLINE Lanes<T, K> absolute(Lanes<T, K> x) {
+    if constexpr (sizeof(T) == 4) return {hn::Abs(x.v)};
     return {hn::Max(x.v, hn::Sub(hn::Zero(hn::ScalableTag<T>()), x.v))};
 }
 /// One count for all lanes.  x86 shifts by a vector of counts in one instruction where it has one for the
@@ -140,6 +141,11 @@ template <class T, KnownRescales K>
 HWY_INLINE Lanes<T, K> floor_shift(Lanes<T, K> x, int bits) {
     return {shift_right_same(x.v, bits)};
 }
+/// x - floor(x 2^-bits) 2^bits.
+template <class T, KnownRescales K>
+HWY_INLINE Lanes<T, K> fraction_bits(Lanes<T, K> x, int bits) {
+    return {hn::And(x.v, hn::Set(hn::ScalableTag<T>(), static_cast<T>((T{1} << bits) - 1)))};
+}
 template <class T, KnownRescales K>
 HWY_INLINE Lanes<T, K> blend(Lanes<T, K> v0, Lanes<T, K> v1, Lanes<T, K> weight, int weight_bits) {
     return shift_left(v0, weight_bits) + weight * (v1 - v0);
@@ -156,8 +162,9 @@ HWY_INLINE Lanes<T, K> within(Lanes<T, K> x, std::int64_t, std::int64_t) {
 /// A format's limit as lanes can hold it: one beyond them is never met, for results fit the lanes.
 template <class T, KnownRescales K>
 HWY_INLINE Lanes<T, K> limit_in_lanes(std::int64_t limit) {
-    return make_word(WordTag<Lanes<T, K>>{}, std::clamp<std::int64_t>(limit, std::numeric_limits<T>::min(),
-                                                                      std::numeric_limits<T>::max()));
+    // By value: a reference to one of three keeps compilers from taking it out of a loop.
+    constexpr std::int64_t kLow = std::numeric_limits<T>::min(), kHigh = std::numeric_limits<T>::max();
+    return make_word(WordTag<Lanes<T, K>>{}, limit < kLow ? kLow : limit > kHigh ? kHigh : limit);
 }
 
 /// quantise.h's formula.  What K does not tell is asked of `to`, in every vector.
@@ -230,7 +237,7 @@ requires(K == KnownRescales::unit_products) HWY_INLINE Lanes<std::int32_t, K> qu
 #endif
 }
 
-// ------------------------------------------------------------------------------------------------ memory:
+// ----------------------------------------------------------------------------------------- memory:
 // always 32-bit words
 
 /// Wires pass between stages in buffers of 32-bit words, whatever the lanes a stage runs in.

@@ -2,12 +2,12 @@
 // here:
 //
 //   + - *   shift_left  floor_shift  min max absolute  == <  select  any  constant<W>  gather  bit_length
-//   vector_length quantise  quotient  blend  affine  within
+//   vector_length quantise  quotient(s)  blend  affine  within
 //
 // Integer<W>   the model: 64 bits, or 128 where a product needs them
 // Audited      the model, counting what every wire carried
-// Real<T>      no rounding: raw units in floating point, so that shifts are exact multiplications by powers
-// of two Range        intervals: what a stage's exact results can reach, and so how wide a word it needs
+// Real<T>      no rounding: raw units in floating point; shifts are exact multiplications
+// Range        intervals: what a stage's exact results can reach, and so how wide a word it needs
 //              (pipeline/plan_words.cpp)
 // Lanes        many samples side by side: lanes.h
 //
@@ -34,8 +34,7 @@ constexpr W constant(std::int64_t value) {
     return make_word(WordTag<W>{}, value);
 }
 
-// ----------------------------------------------------------------------------------------------------------
-// integers
+// ---------------------------------------------------------------------------------------- integers
 
 template <Integer W>
 constexpr W make_word(WordTag<W>, std::int64_t value) {
@@ -134,8 +133,7 @@ constexpr W quotient(W numerator, W denominator, const Rescale& to) {
     return limit(q, to);
 }
 
-// -----------------------------------------------------------------------------------------------------------
-// audited
+// ----------------------------------------------------------------------------------------- audited
 
 /// The model's 128-bit word that counts what arrives on each wire.
 struct Audited {
@@ -225,8 +223,7 @@ inline Audited quotient(Audited numerator, Audited denominator, const Rescale& t
                   static_cast<double>(scaled) / static_cast<double>(denominator.v), to);
 }
 
-// --------------------------------------------------------------------------------------------------------------
-// real
+// -------------------------------------------------------------------------------------------- real
 
 /// A real number in raw units (value * 2^F of its wire): no rounding but where a wire's Rescale is active,
 /// which is how one stage alone is put into fixed point.
@@ -350,8 +347,7 @@ Real<T> quotient(Real<T> numerator, Real<T> denominator, const Rescale& to) {
     return quantise(Real<T>{numerator.v * power_of_two<T>(-to.shift) / denominator.v}, raw);
 }
 
-// -------------------------------------------------------------------------------------------------------------
-// range
+// ------------------------------------------------------------------------------------------- range
 
 /// How wide a stage's numbers get.
 struct WordNeeds {
@@ -412,8 +408,7 @@ Range vector_length(const std::array<Range, 3>& v, int guard);
 Range quantise(Range x, const Rescale& to);
 Range quotient(Range numerator, Range denominator, const Rescale& to);
 
-// ------------------------------------------------------------------------------------------------ wide
-// numbers
+// ------------------------------------------------------------------------------------ wide numbers
 
 /// A few numbers of a stage may need more bits than all others: differences of sums, which a quotient makes
 /// small again.  A Wide<W> holds them next to W: it is W itself where W is wide enough for anything; lanes of
@@ -473,6 +468,13 @@ std::array<W, 4> lerp_rows(const Table& table, W row, W weight, int weight_bits,
             blend(gather(table, row, c), gather(table, row + constant<W>(1), c), weight, weight_bits),
             c < 3 ? to_color : to_alpha);
     return between;
+}
+
+/// Quotients by one denominator.
+template <class W>
+constexpr std::array<W, 3> quotients(const std::array<W, 3>& numerators, W denominator, const Rescale& to) {
+    return {quotient(numerators[0], denominator, to), quotient(numerators[1], denominator, to),
+            quotient(numerators[2], denominator, to)};
 }
 
 /// a b, exact, then quantised once.

@@ -154,16 +154,14 @@ HWY_INLINE std::array<W, 3> normalise(const GradientStage& s, const std::array<W
     std::array<W, 3> size, normal;
     for_three([&](std::size_t a) SQUINT_WRITTEN_OUT { size[a] = absolute(gradient[a]); });
     const W largest = max(max(size[0], size[1]), size[2]);
-    const auto nothing = largest == zero;
     const W shift = constant<W>(kNormalBits) - bit_length(largest);
     for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
         size[a] = within(shift_by(size[a], shift), 0, (std::int64_t{1} << kNormalBits) - 1);
     });
     const W length = max(vector_length(size, kNormalGuard), constant<W>(1));
-    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
-        const W part = quotient(size[a], length, s.to_normal);
-        normal[a] = select(nothing, zero, select(gradient[a] < zero, part, zero - part));
-    });
+    const std::array<W, 3> part = quotients(size, length, s.to_normal);
+    for_three([&](std::size_t a)
+                  SQUINT_WRITTEN_OUT { normal[a] = select(gradient[a] < zero, part[a], zero - part[a]); });
     return normal;
 }
 

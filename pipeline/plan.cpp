@@ -24,7 +24,7 @@ int wire_index(Wire w) {
     return static_cast<int>(w);
 }
 
-// ------------------------------------------------------------------------------------------------ rays
+// -------------------------------------------------------------------------------------------- rays
 
 Vec3 clipped_low(const Plan& plan) {
     Vec3 low = plan.volume->origin;
@@ -41,7 +41,7 @@ Vec3 clipped_high(const Plan& plan) {
 }
 
 // The longest chord a ray can have, in steps.
-// ------------------------------------------------------------------------------------------------ formats
+// ----------------------------------------------------------------------------------------- formats
 
 PresetInputs preset_inputs(const Plan& plan) {
     const Volume& volume = *plan.volume;
@@ -119,7 +119,7 @@ void check_formats(const Plan& plan) {
             require_signed(plan, wire);
 }
 
-// ------------------------------------------------------------------------------------------------ stages
+// ------------------------------------------------------------------------------------------ stages
 
 Rescale rescale(const Plan& plan, int from_fraction, Wire wire) {
     return Rescale(from_fraction, plan.specs[wire], wire_index(wire));
@@ -233,7 +233,7 @@ ClassificationInputs classification_inputs(const Plan& plan) {
 }
 
 void find_unseen_inputs(Plan& plan) {
-    const auto seen = [](const Entry& e) { return e.extinction > 0 || e.opaque; };
+    const auto seen = [](const Entry& e) { return e.is_visible(); };
     const auto& entries = plan.entries.entry;
     const auto first = std::find_if(entries.begin(), entries.end(), seen) - entries.begin();
     const auto behind = std::find_if(entries.rbegin(), entries.rend(), seen).base() - entries.begin();
@@ -385,7 +385,7 @@ void plan_compositing(Plan& plan) {
             "equation_9");
 }
 
-// ------------------------------------------------------------------------------------------------ plan
+// -------------------------------------------------------------------------------------------- plan
 
 void report_stages(Plan& plan) {
     for (const std::string_view name : kStages) plan.stages.push_back({std::string(name), true, {}, {}});

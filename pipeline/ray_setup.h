@@ -58,7 +58,7 @@ HWY_INLINE RaySetupOf<D> set_up_ray(const Plan& plan, D column, D row) {
     return setup;
 }
 
-// ------------------------------------------------------------------------------------------------ words
+// ------------------------------------------------------------------------------------------- words
 
 /// A set-up value to a word: rounded by its wire, or (Real, inactive) exact.
 template <class W>

@@ -57,8 +57,7 @@ Matter::Matter(const Entries& entries, double allowed_extinction, double allowed
         first = s.last;
     }
     visible_upto_.assign(1, 0);
-    for (const Entry& e : entry)
-        visible_upto_.push_back(visible_upto_.back() + (e.extinction > 0 || e.opaque));
+    for (const Entry& e : entry) visible_upto_.push_back(visible_upto_.back() + e.is_visible());
 }
 
 int Matter::before(double coordinate) const {

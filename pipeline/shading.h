@@ -43,8 +43,9 @@ struct ShadingStage {
 
     template <class V>
     void visit(V&& v) {
-        for (Rescale* r : {&to_light_view, &to_dot, &to_reflected, &to_power_input, &to_power, &to_power_lerp, &to_fall,
-                           &to_diffuse_sum, &to_specular_sum, &to_diffuse, &to_specular, &to_lit, &to_light})
+        for (Rescale* r :
+             {&to_light_view, &to_dot, &to_reflected, &to_power_input, &to_power, &to_power_lerp, &to_fall,
+              &to_diffuse_sum, &to_specular_sum, &to_diffuse, &to_specular, &to_lit, &to_light})
             v(*r);
         v(power_table);
     }

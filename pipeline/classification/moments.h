@@ -300,6 +300,12 @@ HWY_NOINLINE W input_at_depth(const MomentSeries& m, W target) {
     return shift_left(entry, e.input_fraction) + fraction;
 }
 
+/// The optical depth of a cut slab, and T's difference that it comes from.
+template <class W>
+struct SlabDepth {
+    W difference, depth;
+};
+
 /// The straight colour of a slab in kPieces pieces of equal depth, none but the last deeper than the limit.
 template <class W>
 HWY_NOINLINE std::array<W, 3> color_in_pieces(const MomentSeries& m, const CutSlab<W>& cut, W front, W length,
@@ -338,7 +344,9 @@ HWY_NOINLINE std::array<W, 3> color_in_pieces(const MomentSeries& m, const CutSl
 template <class W>
 HWY_INLINE Slab<W> classify(const MomentSeries& m, W front, W back, W length) {
     const CutSlab<W> cut = cut_at_wall(m.prefix, front, back);
-    const SlabDepth<W> whole = slab_depth(m.prefix, cut, length);
+    const W difference = absolute(depth_at(m.prefix, cut.end) - depth_at(m.prefix, cut.front));
+    const SlabDepth<W> whole{difference,
+                             depth_of(m.prefix, difference, max(cut.span, constant<W>(1)), length)};
     Slab<W> slab{series_color(m, front, cut.end_input, whole.depth),
                  opacity_of_depth(m.prefix.entries.opacity, whole.depth)};
     if (m.splits) {

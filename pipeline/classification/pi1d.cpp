@@ -25,9 +25,14 @@ PreIntegrated1D build_pre_integrated_1d(const ClassificationInputs& in) {
              {&tables.colored_sum[0], &tables.colored_sum[1], &tables.colored_sum[2], &tables.sum})
             sums.push_back((*column)[i]);
     m.sums.fill(sums, std::array{sum, sum, sum, sum});
+    m.most_rise = most_rise_of(m.sums, PreIntegrated1D::columns);
     const int mean =
         sum.format.fraction_bits;  // of a sum with input_fraction bits more over a span with them
-    const auto to = [&](Wire wire) { return Rescale(mean, in.specs[wire], static_cast<int>(wire)); };
+    const auto to = [&](Wire wire) {
+        Rescale quotient(mean, in.specs[wire], static_cast<int>(wire));
+        quotient.divides = true;
+        return quotient;
+    };
     m.to_color = to(Wire::slab_color), m.to_alpha = to(Wire::slab_alpha), m.to_depth = to(Wire::slab_depth);
     return m;
 }

@@ -21,7 +21,8 @@ struct PreIntegrated1D {
     enum Column { value = 3, columns = 4 };  // red, green, blue before it
     PrefixLookup prefix;
     PremultipliedRules premultiplied;
-    Table sums;  // prefix sums of value times colour, and of value
+    Table sums;                  // prefix sums of value times colour, and of value
+    std::int64_t most_rise = 0;  // of any sum from row to row
     bool is_opacity = true;
     Rescale to_color;  // means
     Rescale to_alpha;
@@ -58,14 +59,14 @@ namespace squint::HWY_NAMESPACE {
 template <class W>
 HWY_INLINE Slab<W> classify(const PreIntegrated1D& m, W front, W back, W length) {
     const CutSlab<W> cut = cut_at_wall(m.prefix, front, back);
-    const W span = max(cut.span, constant<W>(1));
-    const auto sum_of = [&](int column) {
-        const int bits = m.prefix.entries.input_fraction;
-        return absolute(prefix_at(m.sums, cut.end, column, bits) -
-                        prefix_at(m.sums, cut.front, column, bits));
+    const Wide<W> span = widen(max(cut.span, constant<W>(1)));
+    const auto sum_of = [&](int column) SQUINT_WRITTEN_OUT {
+        return absolute(prefix_difference(m.sums, cut.front, cut.end, column, m.prefix.entries.input_fraction,
+                                          m.most_rise));
     };
     Slab<W> slab;
-    const W value = sum_of(PreIntegrated1D::value), one = constant<W>(m.prefix.entries.one_alpha);
+    const Wide<W> value = sum_of(PreIntegrated1D::value);
+    const W one = constant<W>(m.prefix.entries.one_alpha);
     slab.alpha = m.is_opacity ? min(divide(value, span, m.to_alpha), one)
                               : opacity_of_depth(m.prefix.entries.opacity, divide(value, span, m.to_depth));
     const W limit = largest_color(m.premultiplied, slab.alpha);
@@ -73,7 +74,7 @@ HWY_INLINE Slab<W> classify(const PreIntegrated1D& m, W front, W back, W length)
         slab.color[static_cast<std::size_t>(c)] = min(divide(sum_of(c), span, m.to_color), limit);
     const auto shorter = is_shorter(m.prefix.entries, length);
     if (any(shorter)) {
-        const W depth = slab_depth(m.prefix, cut, length).depth;
+        const W depth = slab_depth(m.prefix, cut, length);
         const Slab<W> part =
             with_alpha(m.premultiplied, slab, opacity_of_depth(m.prefix.entries.opacity, depth));
         for (std::size_t c = 0; c < 3; ++c) slab.color[c] = select(shorter, part.color[c], slab.color[c]);

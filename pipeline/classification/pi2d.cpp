@@ -113,6 +113,7 @@ PreIntegrated2D build_pre_integrated_2d(const ClassificationInputs& in) {
                                : std::min(in.input_fraction, most);
     m.to_node =
         Rescale(in.input_fraction, Spec{{integer, m.node_fraction, false}, Rounding::rnd, Overflow::sat});
+    m.to_node.divides = m.scaled;
     m.to_color =
         Rescale(color.format.fraction_bits + m.node_fraction, color, static_cast<int>(Wire::slab_color));
     m.to_alpha =

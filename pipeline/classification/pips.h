@@ -91,14 +91,6 @@ HWY_INLINE Wide<W> prefix_difference(const PrefixSample<W>& front, const PrefixS
     return wide_sum(back.sums[column] - front.sums[column], place_bits,
                     back.at.fraction * back.rises[column] - front.at.fraction * front.rises[column]);
 }
-/// What T's bend takes from it at a sample (depth_at).
-template <class W>
-HWY_INLINE Wide<W> bend_at(const PowerSeriesOfOrder1& m, const PrefixSample<W>& s) {
-    const std::int64_t one = std::int64_t{1} << m.prefix.place_bits();
-    const W hollow = within(s.at.fraction * (constant<W>(one) - s.at.fraction), 0, one * one / 4);
-    return wide_product(hollow, gather(m.prefix.depth, s.at.entry, 1));
-}
-
 /// The slab up to its end, cut or not.
 template <class W>
 HWY_INLINE Slab<W> classify(const PowerSeriesOfOrder1& m, const PrefixSample<W>& front,
@@ -106,7 +98,8 @@ HWY_INLINE Slab<W> classify(const PowerSeriesOfOrder1& m, const PrefixSample<W>&
     const int bits = m.prefix.place_bits();
     const Wide<W> straight = prefix_difference(front, end, 0, bits);
     Wide<W> depth = straight;
-    if (m.prefix.curved) depth = shift_left(straight, bits + 1) - (bend_at(m, end) - bend_at(m, front));
+    if (m.prefix.curved)
+        depth = shift_left(straight, bits + 1) - (bend_at(m.prefix, end.at) - bend_at(m.prefix, front.at));
     depth = absolute(depth);
     const W zero = constant<W>(0), one = constant<W>(m.one_ratio);
     Slab<W> slab{{zero, zero, zero}, zero};

@@ -38,6 +38,13 @@ int sub_entry_bits_for_color(const ClassificationInputs& in, int most_rows) {
     return bits;
 }
 
+std::int64_t most_rise_of(const Table& sums, int columns) {
+    std::int64_t most = 0;
+    for (int i = 0; i + 1 < sums.rows(); ++i)
+        for (int c = 0; c < columns; ++c) most = std::max(most, sums.word(i + 1, c) - sums.word(i, c));
+    return most;
+}
+
 PrefixLookup build_prefix_lookup(const ClassificationInputs& in, int sub_entry_bits) {
     PrefixLookup p;
     p.entries = build_entry_lookup(in);
@@ -77,6 +84,7 @@ PrefixLookup build_prefix_lookup(const ClassificationInputs& in, int sub_entry_b
     const std::array specs{extinction, signed_extinction};
     p.depth.fill(depths, std::span(specs).first(columns));
     p.total = p.depth.word(rows - 1, 0);
+    p.most_rise = most_rise_of(p.depth, 1);
     const int wire = static_cast<int>(Wire::slab_depth);
     p.to_depth = Rescale(extinction.format.fraction_bits + p.gained_bits() - in.input_fraction, depth, wire);
     p.to_depth.divides = true;
@@ -102,6 +110,7 @@ PremultipliedRules build_premultiplied_rules(const WireSpecs& specs) {
     PremultipliedRules rules;
     rules.to_product = Rescale(specs[Wire::slab_ratio].format.fraction_bits + alpha, color, wire);
     rules.to_scaled = Rescale(color.format.fraction_bits, color, wire);
+    rules.to_scaled.divides = true;
     rules.finer = color.format.fraction_bits - alpha;
     rules.one_color = std::min(color.format.one(), color.format.largest());
     return rules;

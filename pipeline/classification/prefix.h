@@ -12,13 +12,14 @@ namespace squint {
 /// alone.
 struct PrefixLookup {
     EntryLookup entries;
-    Table depth;             // T[i]; where `curved`, also the change of extinction to the next row
-    int sub_entry_bits = 0;  // 2^bits rows an entry
-    bool curved = false;     // T bends between rows: extinction is linear there; else straight
-    std::int64_t total = 0;  // the last T; rounding a bend may pass it by a part of a last bit
-    Rescale to_depth;        // slab's depth: (T(b) - T(f)) / |s_b - s_f|
-    Rescale to_shorter;      // times the slab's length
-    Rescale to_wall;         // colour in front of a wall over the wall's
+    Table depth;                 // T[i]; where `curved`, also the change of extinction to the next row
+    int sub_entry_bits = 0;      // 2^bits rows an entry
+    bool curved = false;         // T bends between rows: extinction is linear there; else straight
+    std::int64_t total = 0;      // the last T; rounding a bend may pass it by a part of a last bit
+    std::int64_t most_rise = 0;  // of T from row to row
+    Rescale to_depth;            // slab's depth: (T(b) - T(f)) / |s_b - s_f|
+    Rescale to_shorter;          // times the slab's length
+    Rescale to_wall;             // colour in front of a wall over the wall's
     bool predicts = false;
     Table walls;  // up, down: the nearest opaque entry at or above, at or below; absent where none is opaque
 
@@ -42,6 +43,8 @@ struct PrefixLookup {
     }
 };
 
+/// The most that any of the first columns of prefix sums rises from row to row.
+std::int64_t most_rise_of(const Table& sums, int columns);
 PrefixLookup build_prefix_lookup(const ClassificationInputs& inputs, int sub_entry_bits = 0);
 
 /// log2 of the sub-entries an entry needs so that a colour constant inside them errs by kInsideEntry at most
@@ -67,6 +70,8 @@ PremultipliedRules build_premultiplied_rules(const WireSpecs& specs);
 #endif
 
 #include "pipeline/classification/entries.h"
+
+#include "fixedpoint/unrolled.h"
 
 #include <hwy/highway.h>
 #if defined(SQUINT_PIPELINE_CLASSIFICATION_PREFIX_TARGET) == defined(HWY_TARGET_TOGGLE)
@@ -118,6 +123,28 @@ HWY_INLINE W depth_at(const PrefixLookup& p, const EntryPosition<W>& at) {
                   (p.total + 1) << p.gained_bits());
 }
 
+/// The difference of a prefix sum between two positions, exact with `bits` more fraction bits than its words,
+/// which rise by `most_rise` from row to row.
+template <class W>
+HWY_INLINE Wide<W> prefix_difference(const Table& table, const EntryPosition<W>& front,
+                                     const EntryPosition<W>& end, int column, int bits,
+                                     std::int64_t most_rise) {
+    const W from = gather(table, front.entry, column), to = gather(table, end.entry, column);
+    const auto part = [&](const EntryPosition<W>& at, W sum) SQUINT_WRITTEN_OUT {
+        const W rise = within(gather(table, at.entry + constant<W>(1), column) - sum, 0, most_rise);
+        return within(at.fraction, 0, std::int64_t{1} << bits) * rise;
+    };
+    return wide_sum(to - from, bits, part(end, to) - part(front, from));
+}
+/// What T's bend takes from it (depth_at).
+template <class W>
+HWY_INLINE Wide<W> bend_at(const PrefixLookup& p, const EntryPosition<W>& at) {
+    const std::int64_t one = std::int64_t{1} << p.place_bits();
+    const W part = within(at.fraction, 0, one);
+    const W hollow = within(part * (constant<W>(one) - part), 0, one * one / 4);
+    return wide_product(hollow, gather(p.depth, at.entry, 1));
+}
+
 /// A slab cut where it first meets an opaque entry: in either direction, both ends included.
 template <class W>
 struct CutSlab {
@@ -158,16 +185,14 @@ HWY_INLINE W depth_of(const PrefixLookup& p, const N& difference, const N& span,
     if (any(shorter)) depth = select(shorter, quantise(depth * length, p.to_shorter), depth);
     return depth;
 }
-/// The optical depth of a cut slab, and T's difference that it comes from.
+/// The optical depth of a cut slab, where an entry has one row.
 template <class W>
-struct SlabDepth {
-    W difference, depth;
-};
-/// Where an entry has one row.
-template <class W>
-HWY_INLINE SlabDepth<W> slab_depth(const PrefixLookup& p, const CutSlab<W>& cut, W length) {
-    const W difference = absolute(depth_at(p, cut.end) - depth_at(p, cut.front));
-    return {difference, depth_of(p, difference, max(cut.span, constant<W>(1)), length)};
+HWY_INLINE W slab_depth(const PrefixLookup& p, const CutSlab<W>& cut, W length) {
+    const int bits = p.place_bits();
+    Wide<W> difference = prefix_difference(p.depth, cut.front, cut.end, 0, bits, p.most_rise);
+    if (p.curved)
+        difference = shift_left(difference, bits + 1) - (bend_at(p, cut.end) - bend_at(p, cut.front));
+    return depth_of(p, absolute(difference), widen(max(cut.span, constant<W>(1))), length);
 }
 
 /// The straight colour of the wall that ends a slab.

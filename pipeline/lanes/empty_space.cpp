@@ -50,8 +50,8 @@ void measure_row(const Volume& volume, BlockRanges& ranges, std::int64_t y, std:
 // them on the way forth and 13 on the way back.
 void spread(std::vector<std::uint8_t>& distance, const Index3& blocks) {
     const auto nx = static_cast<std::size_t>(blocks.x);
-    std::vector<std::uint8_t> nearest(nx +
-                                      2);  // of the rows already passed, with a block more on either side
+    // Of the rows already passed, with a block more on either side.
+    std::vector<std::uint8_t> nearest(nx + 2);
     const auto pass = [&](bool forth) {
         const std::int64_t before = forth ? -1 : 1;
         const auto at = [&](std::int64_t i, std::int64_t count) { return forth ? i : count - 1 - i; };
@@ -84,12 +84,13 @@ void spread(std::vector<std::uint8_t>& distance, const Index3& blocks) {
     pass(true), pass(false);
 }
 
+// At each corner of blocks, the least distance of the eight about it.
 void clear_corners(EmptySpace& space) {
     const Index3 blocks = space.box.blocks, n = blocks + Index3(1);
+    const auto count = static_cast<std::size_t>(n.x * n.y * n.z);
     space.corners = n;
-    space.clear.reserve(static_cast<std::size_t>(n.x * n.y * n.z) +
-                        3);  // lanes read four bytes at any of them
-    space.clear.assign(static_cast<std::size_t>(n.x * n.y * n.z), 255);
+    space.clear.reserve(count + 3);  // lanes read four bytes at any of them
+    space.clear.assign(count, 255);
     tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
         for (std::int64_t y = 0; y < n.y; ++y) {
             std::uint8_t* here = space.clear.data() + (z * n.y + y) * n.x;
@@ -127,9 +128,6 @@ void widen(BlockRanges& ranges) {
     pass(1, n.x), pass(n.x, n.y), pass(n.x * n.y, n.z);
 }
 
-}  // namespace
-
-namespace {
 std::shared_ptr<BlockRanges> measure(const Volume& volume, const BlockBox& box) {
     auto ranges = std::make_shared<BlockRanges>();
     ranges->box = box;
@@ -144,6 +142,7 @@ std::shared_ptr<BlockRanges> measure(const Volume& volume, const BlockBox& box) 
     });
     return ranges;
 }
+
 }  // namespace
 
 bool BlockBox::holds(const BlockBox& other) const {
@@ -170,8 +169,7 @@ EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, i
     // visible_before[i]: entries below i in which anything can be seen.
     std::vector<int> visible_before(static_cast<std::size_t>(entries.size()) + 1, 0);
     for (std::size_t i = 0; i < entries.entry.size(); ++i)
-        visible_before[i + 1] =
-            visible_before[i] + (entries.entry[i].extinction > 0 || entries.entry[i].opaque);
+        visible_before[i + 1] = visible_before[i] + entries.entry[i].is_visible();
     // A sample's rounding may reach the next entry: one more on either side.
     const int last = entries.size() - 1, more = 1 + entry_reach;
     const auto entry_at = [&](double place) {
@@ -179,8 +177,8 @@ EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, i
     };
     std::uint16_t greatest = 0;
     for (const std::uint16_t scalar : ranges.largest) greatest = std::max(greatest, scalar);
-    std::vector<int> before_from(greatest + 1U),
-        before_to(greatest + 1U);  // visible entries below a scalar's
+    // Visible entries below those that a scalar may reach.
+    std::vector<int> before_from(greatest + 1U), before_to(greatest + 1U);
     for (std::size_t scalar = 0; scalar <= greatest; ++scalar) {
         const double entry = entries.coordinate(static_cast<double>(scalar));
         before_from[scalar] = visible_before[entry_at(std::floor(entry) - more)];

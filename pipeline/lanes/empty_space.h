@@ -34,9 +34,8 @@ std::shared_ptr<const BlockRanges> block_ranges(const Volume& volume, const Bloc
 struct EmptySpace {
     BlockBox box;  // no ray leaves it
     std::vector<std::uint8_t> distance;
-    Index3 corners{0, 0, 0};  // of the blocks: one more along each axis
-    std::vector<std::uint8_t>
-        clear;  // empty blocks about each corner on every side: its blocks' least distance
+    Index3 corners{0, 0, 0};          // of the blocks: one more along each axis
+    std::vector<std::uint8_t> clear;  // empty blocks about each corner on every side
     std::int64_t visible_blocks = 0;
     std::uint8_t at(std::int64_t x, std::int64_t y, std::int64_t z) const {
         const Index3 &low = box.low, &n = box.blocks;

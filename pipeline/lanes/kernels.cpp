@@ -48,7 +48,7 @@ StageKernels kernels_for(const Plan& plan, const StageWays& ways, const VoxelSou
     sampling_kernels(target, plan, ways, kernels);
     voxel_kernels(target, source, kernels);
     classification_kernel(target, plan, ways.classification, kernels);
-    shading_kernel(target, ways, kernels);
+    shading_kernels(target, plan, ways, kernels);
     compositing_kernel(target, plan, ways.compositing, kernels);
     projection_kernel(target, plan, kernels);
     return kernels;

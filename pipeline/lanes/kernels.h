@@ -54,7 +54,10 @@ struct StageKernels {
                        Samples&) = nullptr;
     /// Rows [from, to): corners to scalars, which take the inputs' place.
     void (*interpolate_scalars)(const Plan&, int from, int to, Samples&) = nullptr;
-    /// Colours of the first `count` gathered samples; reads and writes up to the next multiple of the lanes.
+    /// Normals of the first `count` gathered samples; this and the next read and write up to the next
+    /// multiple of the lanes.
+    void (*find_normals)(const Plan&, int count, LitSamples&) = nullptr;
+    /// Their colours.
     void (*shade)(const Plan&, int count, LitSamples&) = nullptr;
     /// Slabs [0, steps) onto pixels; rays freeze where they end.  Where the plan wants depth, `between` takes
     /// T at the slabs' ends: row s at the front of slab s.
@@ -94,7 +97,7 @@ void ray_kernels(std::int64_t target, StageKernels& kernels);
 void sampling_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels);
 void voxel_kernels(std::int64_t target, const VoxelSource& source, StageKernels& kernels);
 void classification_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);
-void shading_kernel(std::int64_t target, const StageWays& ways, StageKernels& kernels);
+void shading_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels);
 void compositing_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);
 void projection_kernel(std::int64_t target, const Plan& plan, StageKernels& kernels);
 

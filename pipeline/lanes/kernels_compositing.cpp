@@ -9,6 +9,7 @@
 #include "fixedpoint/lanes.h"
 #include "pipeline/compositing.h"
 #include "pipeline/lanes/kernels.h"
+#include "pipeline/lanes/plain.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
@@ -17,11 +18,10 @@ namespace {
 /// The default's compositing: form w, straight colours, sums that no limit meets.  A transparent slab is the
 /// identity.
 bool is_plain(const CompositingStage& s) {
-    const auto drops_bits = [](const Rescale& to) { return to.shift > 0 && !to.limits; };
-    const auto does_nothing = [](const Rescale& to) { return to.shift == 0 && !to.limits; };
     return s.form == CompositingForm::w && !s.premultiplied &&
-           s.contribution_fraction == s.transparency_fraction && drops_bits(s.to_contribution) &&
-           drops_bits(s.to_color) && does_nothing(s.to_color_sum) && does_nothing(s.to_transparency);
+           s.contribution_fraction == s.transparency_fraction && lanes::drops_bits(s.to_contribution) &&
+           lanes::drops_bits(s.to_color) && lanes::does_nothing(s.to_color_sum) &&
+           lanes::does_nothing(s.to_transparency);
 }
 /// Its products are those of numbers from 0 to 1 of 15 bits.
 bool is_of_units(const CompositingStage& s) {
@@ -33,10 +33,8 @@ bool is_of_units(const CompositingStage& s) {
 HWY_INLINE void take_as_plain(CompositingStage& s) {
     s.form = CompositingForm::w, s.premultiplied = false;
     s.contribution_fraction = s.transparency_fraction;
-    for (Rescale* to : {&s.to_contribution, &s.to_color, &s.to_color_sum, &s.to_transparency})
-        to->limits = false;
-    s.to_color_sum.shift = s.to_transparency.shift = 0;
-    if (s.to_contribution.shift <= 0 || s.to_color.shift <= 0) __builtin_unreachable();
+    lanes::take_as_dropping_bits(s.to_contribution), lanes::take_as_dropping_bits(s.to_color);
+    lanes::take_as_doing_nothing(s.to_color_sum), lanes::take_as_doing_nothing(s.to_transparency);
 }
 
 template <class L, bool kPlain, bool kKeepsT>
@@ -152,8 +150,11 @@ void compositing_kernel_of(const Plan& plan, const lanes::StageWay& way, lanes::
                             : is_plain(plan.compositing) ? &composite_rows<L, true, false>
                                                          : &composite_rows<L, false, false>;
     });
-    if (way.bits == 32 && !way.is_float && !plan.scene.output.depth && is_of_units(plan.compositing))
-        kernels.composite = &composite_rows<Lanes<std::int32_t, KnownRescales::unit_products>, true, false>;
+    if (way.bits == 32 && !way.is_float && is_of_units(plan.compositing)) {
+        using L = Lanes<std::int32_t, KnownRescales::unit_products>;
+        kernels.hide = &hide_rows<L, true>;
+        if (!plan.scene.output.depth) kernels.composite = &composite_rows<L, true, false>;
+    }
     kernels.store_colors = &store_colors;
 }
 

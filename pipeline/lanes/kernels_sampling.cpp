@@ -24,8 +24,7 @@ HWY_INLINE CellPosition<L> cell_position_inside(const LocationStage& s, const st
     CellPosition<L> position;
     for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
         position.cell[a] = floor_shift(location[a], s.location_fraction);
-        position.weight[a] =
-            quantise(location[a] - shift_left(position.cell[a], s.location_fraction), s.to_weight);
+        position.weight[a] = quantise(fraction_bits(location[a], s.location_fraction), s.to_weight);
     });
     return position;
 }

@@ -47,8 +47,7 @@ HWY_INLINE Word pair_at(const std::uint8_t* voxels) {
     return (both & 0xff) | (both >> 8) << 16;
 }
 
-// ------------------------------------------------------------------------------------------------ the volume
-// itself
+// ------------------------------------------------------------------------------- the volume itself
 
 template <class T>
 HWY_INLINE const T* corner_of(const Volume& volume, const Samples& s, int i) {
@@ -92,7 +91,7 @@ void fetch_linear(const VoxelSource& source, int from, int to, Samples& s) {
     }
 }
 
-// ------------------------------------------------------------------------------------------------ cells
+// ------------------------------------------------------------------------------------------- cells
 
 template <class T>
 void prefetch_cells(const VoxelSource& source, int from, int to, Samples& s) {
@@ -112,10 +111,12 @@ void prefetch_cells(const VoxelSource& source, int from, int to, Samples& s) {
         const auto slot = hn::GatherIndex(d, source.slots.data(), block);
         hn::Store(hn::Or(slot, offset), d, s.place.v + at);  // -1 stays -1
     }
+    // As numbers: a cell that is not there has an address before all others, which a request may name.
+    const auto cells = reinterpret_cast<std::intptr_t>(source.cells);
     for (int i = from * kRays; i < to * kRays; i += kRays)
         for (const int ray : kOutermost)
-            __builtin_prefetch(source.cells + std::int64_t{std::max(s.place.v[i + ray], 0)} *
-                                                  static_cast<std::int64_t>(8 * sizeof(T)));
+            __builtin_prefetch(reinterpret_cast<const void*>(
+                cells + std::intptr_t{s.place.v[i + ray]} * static_cast<std::intptr_t>(8 * sizeof(T))));
 }
 template <class T>
 void fetch_cells(const VoxelSource& source, int from, int to, Samples& s) {
@@ -148,8 +149,7 @@ void fetch_cells(const VoxelSource& source, int from, int to, Samples& s) {
     }
 }
 
-// ------------------------------------------------------------------------------------------------ samples to
-// be lit
+// ------------------------------------------------------------------------------- samples to be lit
 
 int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, int steps, const Samples& s,
                        lanes::LitSamples& lit) {
@@ -194,21 +194,29 @@ constexpr unsigned rows_of(GradientRule rule) {
     return rule == GradientRule::analytic ? 0x0660U : rule == GradientRule::central ? 0x6ff6U : 0xffffU;
 }
 
-/// Four voxels along x at each lane's element of a row, as two words of pairs: one gather of four bytes or
-/// two of eight.
+using Words = hn::Vec<hn::ScalableTag<Word>>;
+
+/// Four voxels along x at each lane's element of a row, as two words of pairs, or the middle two of them: by
+/// gathers.
 #if HWY_TARGET != HWY_SCALAR
 constexpr bool kGathersRows = true;
-HWY_INLINE auto gathered_row(const std::uint8_t* row, hn::Vec<hn::ScalableTag<Word>> first) {
+HWY_INLINE Words spread_bytes(Words two) {
+    const hn::ScalableTag<Word> d;
+    return hn::And(hn::Or(two, hn::ShiftLeft<8>(two)), hn::Set(d, 0x00ff00ff));
+}
+HWY_INLINE std::array<Words, 2> gathered_row(const std::uint8_t* row, Words first) {
     const hn::ScalableTag<Word> d;
     const hn::RebindToUnsigned<decltype(d)> du;
     const auto four = hn::GatherOffset(d, reinterpret_cast<const Word*>(row), first);
     const auto upper = hn::BitCast(d, hn::ShiftRight<16>(hn::BitCast(du, four)));
-    const auto spread = [&](auto two) HWY_ATTR {
-        return hn::And(hn::Or(two, hn::ShiftLeft<8>(two)), hn::Set(d, 0x00ff00ff));
-    };
-    return std::array<hn::Vec<decltype(d)>, 2>{spread(hn::And(four, hn::Set(d, 0xffff))), spread(upper)};
+    return {spread_bytes(hn::And(four, hn::Set(d, 0xffff))), spread_bytes(upper)};
 }
-HWY_INLINE auto gathered_row(const std::uint16_t* row, hn::Vec<hn::ScalableTag<Word>> first) {
+HWY_INLINE Words gathered_inner_pair(const std::uint8_t* row, Words first) {
+    const hn::ScalableTag<Word> d;
+    const auto four = hn::GatherOffset(d, reinterpret_cast<const Word*>(row), first);
+    return hn::Or(hn::And(hn::ShiftRight<8>(four), hn::Set(d, 0xff)), hn::And(four, hn::Set(d, 0xff0000)));
+}
+HWY_INLINE std::array<Words, 2> gathered_row(const std::uint16_t* row, Words first) {
     const hn::ScalableTag<Word> d;
     const hn::ScalableTag<std::int64_t> d64;
     const hn::Half<decltype(d)> half;
@@ -217,12 +225,20 @@ HWY_INLINE auto gathered_row(const std::uint16_t* row, hn::Vec<hn::ScalableTag<W
         return hn::BitCast(d, hn::GatherOffset(d64, reinterpret_cast<const std::int64_t*>(row), offset));
     };
     const auto low = fours(hn::LowerHalf(half, first)), high = fours(hn::UpperHalf(half, first));
-    return std::array<hn::Vec<decltype(d)>, 2>{hn::ConcatEven(d, high, low), hn::ConcatOdd(d, high, low)};
+    return {hn::ConcatEven(d, high, low), hn::ConcatOdd(d, high, low)};
+}
+HWY_INLINE Words gathered_inner_pair(const std::uint16_t* row, Words first) {
+    return hn::GatherOffset(hn::ScalableTag<Word>(), reinterpret_cast<const Word*>(row + 1),
+                            hn::ShiftLeft<1>(first));
 }
 #else
 constexpr bool kGathersRows = false;
 template <class T>
-std::array<hn::Vec<hn::ScalableTag<Word>>, 2> gathered_row(const T*, hn::Vec<hn::ScalableTag<Word>>) {
+std::array<Words, 2> gathered_row(const T*, Words) {
+    return {};
+}
+template <class T>
+Words gathered_inner_pair(const T*, Words) {
     return {};
 }
 #endif
@@ -234,7 +250,9 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
     const Index3 n = volume.dims;
     const T* data = static_cast<const T*>(volume.data.get());
     const unsigned rows = rows_of(plan.gradient.rule);
-    const bool offsets_fit = volume.voxels() < std::numeric_limits<Word>::max();
+    const bool offsets_fit =
+        volume.voxels() < std::numeric_limits<Word>::max() / static_cast<std::int64_t>(sizeof(T));
+    const bool cross = plan.gradient.rule == GradientRule::central;
     const auto clamped = [](std::int64_t i, std::int64_t end) {
         return std::clamp<std::int64_t>(i, 0, end - 1);
     };
@@ -260,7 +278,12 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
                     first = hn::IfThenElseZero(hn::FirstN(d, static_cast<std::size_t>(here)), first);
                     for (int row = 0; row < 16; ++row) {
                         if (!(rows >> row & 1)) continue;
-                        const auto two = gathered_row(data + n.x * (row % 4 + n.y * (row / 4)), first);
+                        const T* line = data + n.x * (row % 4 + n.y * (row / 4));
+                        if (cross && lanes::is_outer_row(row % 4, row / 4)) {
+                            hn::Store(gathered_inner_pair(line, first), d, pair[2 * row].v + at);
+                            continue;
+                        }
+                        const std::array<Words, 2> two = gathered_row(line, first);
                         hn::Store(two[0], d, pair[2 * row].v + at);
                         hn::Store(two[1], d, pair[2 * row + 1].v + at);
                     }
@@ -284,8 +307,9 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
                         else
                             return load_quads(address);
                     }();
-                    hn::Store(words[0], d, pair[2 * row].v + at),
-                        hn::Store(words[1], d, pair[2 * row + 1].v + at);
+                    const bool inner = cross && lanes::is_outer_row(row % 4, row / 4);
+                    hn::Store(inner ? inner_pair(words[0], words[1]) : words[0], d, pair[2 * row].v + at);
+                    hn::Store(words[1], d, pair[2 * row + 1].v + at);
                 }
                 continue;
             }
@@ -296,14 +320,14 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
                     const T* line = data + n.x * (clamped(cell[1].v[i] + row % 4 - 1, n.y) +
                                                   n.y * clamped(cell[2].v[i] + row / 4 - 1, n.z));
                     const auto voxel = [&](int x) { return Word{line[clamped(cell[0].v[i] + x - 1, n.x)]}; };
-                    pair[2 * row].v[i] = voxel(0) | voxel(1) << 16,
-                             pair[2 * row + 1].v[i] = voxel(2) | voxel(3) << 16;
+                    const bool inner = cross && lanes::is_outer_row(row % 4, row / 4);
+                    pair[2 * row].v[i] = inner ? voxel(1) | voxel(2) << 16 : voxel(0) | voxel(1) << 16;
+                    pair[2 * row + 1].v[i] = voxel(2) | voxel(3) << 16;
                 }
         }
 }
 
-// ------------------------------------------------------------------------------------------------ empty
-// space
+// ------------------------------------------------------------------------------------- empty space
 
 /// Bit i of the answer: whether something may be seen about some beam at row `at[i]`, i < kWindow.
 template <class At>

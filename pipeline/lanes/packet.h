@@ -79,14 +79,21 @@ struct alignas(64) Samples {
 struct alignas(64) LitSamples {
     Batch from;                      // place in the batch
     Batch cell[2][3], weight[2][3];  // of the front sample, and of the back one where a slab has two
-    Batch pair[2][32];               // the 4x4x4 voxels about its cell, by pairs along x
-    Batch location[2][3];            // in place of cell and weight, of a gradient from samples
-    Batch beside[2][3][2];           // scalars one voxel off along each axis: behind, ahead
+    // The 4x4x4 voxels about its cell, by pairs along x; for central differences alone, of outer rows the
+    // inner pair, in place of the first.
+    Batch pair[2][32];
+    Batch location[2][3];   // in place of cell and weight, of a gradient from samples
+    Batch beside[2][3][2];  // scalars one voxel off along each axis: behind, ahead
     Batch half[kMostHalves][3], view[3];
     Batch gradient[3];  // raw; the sum of a slab's two ends
     Batch normal[3];
     Batch color[3], alpha;
 };
+
+/// Whether a row of four voxels, of the 4x4 about a cell, holds none of the cell's corners.
+constexpr bool is_outer_row(int y, int z) {
+    return y % 3 == 0 || z % 3 == 0;
+}
 
 /// Sixteen pixels on their way.
 struct alignas(64) PixelPacket {

@@ -225,6 +225,7 @@ class PacketLoop {
             sample_beside(count);
         else
             kernels_.fetch_lit(plan_, count, lit);
+        kernels_.find_normals(plan_, count, lit);
         kernels_.shade(plan_, count, lit);
         for (int i = 0; i < count; ++i)
             for (int c = 0; c < 3; ++c) s.color[c].v[lit.from.v[i]] = lit.color[c].v[i];

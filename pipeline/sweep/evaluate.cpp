@@ -222,7 +222,8 @@ std::shared_ptr<const Volume> Evaluator::volume_of(const Scene& scene) {
     Loaded& loaded = found->second;
     if (is_new) try {
             loaded.volume = std::make_shared<const Volume>(load_volume(volume_source(scene)));
-            lanes::block_ranges(*loaded.volume, lanes::all_blocks_of(*loaded.volume));  // now, not while points run beside each other
+            // Now, not while points run beside each other.
+            lanes::block_ranges(*loaded.volume, lanes::all_blocks_of(*loaded.volume));
         } catch (const InputError& error) {
             loaded.failure = error.what();
         }
@@ -315,7 +316,7 @@ Prepared Evaluator::prepare(const Point& point) {
     return p;
 }
 
-// ------------------------------------------------------------------------------------------------ baselines
+// --------------------------------------------------------------------------------------- baselines
 
 std::vector<Evaluator::BaselineScene> Evaluator::baselines_of(const Prepared& point) {
     std::vector<BaselineScene> all;
@@ -414,7 +415,7 @@ std::vector<std::string> Evaluator::baseline_keys(const Prepared& point) {
     return keys;
 }
 
-// ------------------------------------------------------------------------------------------------ figures
+// ----------------------------------------------------------------------------------------- figures
 
 std::vector<std::string> Evaluator::wanted() const {
     const Measure& m = sweep_.measure;

@@ -227,7 +227,7 @@ std::string escaped_html(const std::string& text) {
     return out;
 }
 
-// ------------------------------------------------------------------------------------------------ tables
+// ------------------------------------------------------------------------------------------ tables
 
 std::string cell_text(const Json& value) {
     if (value.is_null()) return "";

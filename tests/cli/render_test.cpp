@@ -166,7 +166,7 @@ TEST_F(Render, ScenesThatHaveLittleToShowWork) {
     }
 }
 
-// ------------------------------------------------------------------------------------------------ bad input
+// --------------------------------------------------------------------------------------- bad input
 
 TEST_F(Render, MistakesInAFileAreNamedWithTheirPlace) {
     write("s.toml", "[volume]\nprocedural = \"phantom\"\n[samplig]\nstep = 1\n");
@@ -278,8 +278,7 @@ TEST_F(Render, StandardOutputThatCannotBeWrittenIsAnError) {
     EXPECT_THAT(r.err, HasSubstr("squint: standard output"));
 }
 
-// ------------------------------------------------------------------------------------------------
-// interruption
+// ------------------------------------------------------------------------------------ interruption
 
 /// Starts `squint ARGUMENTS` in `folder`, waits until it has begun to listen for `signal` (Linux tells), then
 /// `delay`, and sends it.  (sh would start a job in the background with SIGINT ignored.)
@@ -291,9 +290,12 @@ Outcome interrupt(const fs::path& folder, const std::string& arguments, int sign
     if (child == 0) execl("/bin/sh", "sh", "-c", line.c_str(), nullptr), _exit(127);
     const auto listens = [&] {
         std::ifstream status("/proc/" + std::to_string(child) + "/status");
-        for (std::string word; status >> word;)
+        for (std::string word; status >> word;) {
+            if (word == "Name:" && status >> word && word != "squint") return false;  // sh listens, too
+            if (word == "State:" && status >> word && word == "Z") return true;
             if (word == "SigCgt:" && status >> word)
                 return (std::stoull(word, nullptr, 16) >> (signal - 1) & 1) != 0;
+        }
         return true;  // it has ended
     };
     while (!listens()) std::this_thread::sleep_for(std::chrono::milliseconds(2));

@@ -104,7 +104,7 @@ TEST(Quantise, OneTimesOneIsOne) {
         }
 }
 
-// ------------------------------------------------------------------------------------------ from doubles
+// ------------------------------------------------------------------------------------ from doubles
 
 /// x 2^F is exact in a double (a power of two, upwards), and so are its integer part and its fraction.
 /// From 2^62 on, and so for infinities, wrapping formats saturate too.

@@ -25,8 +25,8 @@ namespace {
 // The integers' overloads; those of lanes are found by their arguments.
 using squint::absolute, squint::affine, squint::bit_length, squint::blend, squint::clamp, squint::floor_shift,
     squint::gather, squint::max, squint::min, squint::quantise, squint::quantised_product, squint::quotient,
-    squint::select, squint::shift_by, squint::shift_left, squint::vector_length, squint::wide_product,
-    squint::wide_sum, squint::widen;
+    squint::quotients, squint::select, squint::shift_by, squint::shift_left, squint::vector_length,
+    squint::wide_product, squint::wide_sum, squint::widen;
 
 /// Draws operands, runs one operation on lanes and on integers, and keeps the first difference of each.
 template <class T, KnownRescales K = KnownRescales::nothing>
@@ -160,6 +160,18 @@ void compare_quotients(Comparison<T>& compare) {
         "quotient to " + to_string(spec),
         [&](int i) { return i == 1 ? 1 + compare.any(28, false) : compare.any(wide, false); },
         [&](auto x, auto y, auto) { return quotient(x, y, to); });
+    compare(
+        "quotients by one denominator to " + to_string(spec),
+        [&](int i) { return i == 1 ? 1 + compare.any(28, false) : compare.any(wide, false); },
+        [&](auto x, auto y, auto z) {
+            const auto three = quotients(std::array{x, z, x + z - x}, y, to);
+            return three[0] + three[1] - three[2];
+        });
+    // Ties, and quotients a hair's breadth off one.
+    compare(
+        "quotients near ties to " + to_string(spec),
+        [&](int i) { return i == 1 ? 1 + compare.between(0, 6) : compare.any(12, false); },
+        [&](auto x, auto y, auto) { return quotient(x, y, to); });
 }
 
 /// Quotients of numbers wider than 32 bits.
@@ -214,7 +226,7 @@ void compare_words(std::vector<std::string>& wrong) {
         compare_quantise(known_even), compare_quantise(known_up);
     }
     for (int round = 0; round < 4000 && wrong.size() < 4; ++round) {
-        const int guard = static_cast<int>(compare.between(0, 9));
+        const int guard = static_cast<int>(compare.between(0, sizeof(T) == 4 ? 8 : 9));
         compare(
             "vector_length", [&](int) { return compare.between(0, 3) ? compare.any(15, false) : 0x7fff; },
             [guard](auto x, auto y, auto z) {

@@ -25,7 +25,7 @@ void expect_pixel(const std::array<double, 4>& pixel, double color, double alpha
     EXPECT_NEAR(pixel[3], alpha, tolerance);
 }
 
-// -------------------------------------------------------------------------------------------- unlit matter
+// ------------------------------------------------------------------------------------ unlit matter
 
 TEST(Reference, AConstantBoxIsBeersLawInWorldUnits) {
     const auto volume = volume_of({9, 7, 5}, 8, Vec3(1, 0.5, 3), [](const Index3&) { return 128; });
@@ -224,7 +224,7 @@ TEST(Reference, HalvingTheToleranceChangesNothingBeyondIt) {
     }
 }
 
-// ----------------------------------------------------------------------------------------- opaque surfaces
+// --------------------------------------------------------------------------------- opaque surfaces
 
 TEST(Reference, ARayEndsExactlyWhereItFirstMeetsAnOpaqueEntry) {
     // Black fog, tau 0.4, and opaque entries of colour at 77 (1) and 100 (0.5): colour runs up to it along
@@ -266,7 +266,7 @@ TEST(Reference, BetweenTwoOpaqueEntriesARayEndsAtOnce) {
     expect_pixel(reference_pixel(plan, 0, 0), 0, 0);
 }
 
-// ------------------------------------------------------------------------------------------------- light
+// ------------------------------------------------------------------------------------------- light
 
 /// A field a x + b y + c z, far from whose faces every estimator gives its exact gradient.
 std::shared_ptr<const Volume> slope(const Vec3& spacing) {
@@ -371,7 +371,7 @@ TEST(Reference, AtAFaceTheDifferenceIsTakenToTheVoxelItself) {
     EXPECT_NEAR(pixel[0] / pixel[3], 40 / std::sqrt(1600.0 + 3600), 1e-6);
 }
 
-// ------------------------------------------------------------------------------------- modes and pictures
+// ------------------------------------------------------------------------------ modes and pictures
 
 TEST(Reference, ModesTakeTheFieldsOwnExtremesAndMean) {
     // s = 255 (x (1 - y)) along a diagonal of the cell's face: 255 r (1 - r) has its greatest, 63.75, inside.

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 using sweep::Json;
 using ::testing::HasSubstr;
 
-// ------------------------------------------------------------------------------------------------ lengths
+// ----------------------------------------------------------------------------------------- lengths
 
 /// Wires whose roundings add up as independent noise does: a share of 4^-F each, a price a bit each.
 struct Model {
@@ -108,7 +108,7 @@ TEST(WordLengths, SayWhenNotEvenTheMostAreEnough) {
     EXPECT_FALSE(find_lengths(model.problem(1e-9, 4), {}).feasible);
 }
 
-// ------------------------------------------------------------------------------------------------ scenes
+// ------------------------------------------------------------------------------------------ scenes
 
 class Search : public ::testing::Test {
   protected:

@@ -121,7 +121,7 @@ TEST(SweepFile, SaysInOneLineWhatIsWrongAndWhere) {
     EXPECT_THAT(refusal("[measure]\nrael = true\n"), HasSubstr("did you mean \"real\"?"));
 }
 
-// ------------------------------------------------------------------------------------------------ points
+// ------------------------------------------------------------------------------------------ points
 
 std::vector<Prepared> prepared(const SweepFile& sweep) {
     Evaluator evaluator(sweep, "");
@@ -223,7 +223,7 @@ TEST(SweepPoint, CountsSamplesAtWhichTransparencyStuck) {
     EXPECT_EQ(record["audit"]["color"]["underflowed"], 0);
 }
 
-// ------------------------------------------------------------------------------------------------ cost
+// -------------------------------------------------------------------------------------------- cost
 
 TEST(SweepCost, IsTheSumOfWidthsAndOfProductsOfOperandWidths) {
     const SweepFile sweep = parsed(kTiny + "precision.preset = 'squeeze'\nvolume.bits = 8\n");
@@ -267,7 +267,7 @@ TEST(SweepCost, CountsEveryWireThatCarriesSomething) {
     }
 }
 
-// ------------------------------------------------------------------------------------------------ pictures
+// ---------------------------------------------------------------------------------------- pictures
 
 TEST(SweepValues, KeepEveryNthPixelToSixteenBits) {
     Image image{7, 5, {}};
