@@ -72,7 +72,7 @@ def svg(axes):
 def main():
     if len(sys.argv) != 3:
         sys.exit(__doc__)
-    result = read(sys.argv[1])
+    result = read([sys.argv[1]])
     axes = {}
     for name, run in medians(result).items():
         axes.setdefault(name.split("/")[1], []).append(run)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Tables from the benchmarks' JSON, on standard output, as Markdown.
 
-    bench/tables.py vtk vtk.jsonl > docs/measurements/vtk.md
+    bench/tables.py vtk vtk.jsonl [more.jsonl ...] > docs/measurements/vtk.md
     bench/tables.py equal-error equal_error.jsonl
     bench/tables.py frame frame.json          (Google Benchmark's)
 """
@@ -10,19 +10,21 @@ import statistics
 import sys
 
 
-def read(path):
-    """Google Benchmark's one object, or our lines of {"machine": ...}, {"fog": ...} and {"case": ...}."""
-    with open(path, encoding="utf-8") as file:
-        text = file.read()
-    if '"benchmarks"' in text:
-        return json.loads(text)
+def read(paths):
+    """Google Benchmark's one object, or our lines of {"machine": ...}, {"fog": ...} and {"case": ...}: of several
+    files the cases of all, and the rest of the first."""
     result = {"cases": []}
-    for line in text.splitlines():
-        for key, value in json.loads(line).items():
-            if key == "case":
-                result["cases"].append(value)
-            else:
-                result[key] = value
+    for path in paths:
+        with open(path, encoding="utf-8") as file:
+            text = file.read()
+        if '"benchmarks"' in text:
+            return json.loads(text)
+        for line in text.splitlines():
+            for key, value in json.loads(line).items():
+                if key == "case":
+                    result["cases"].append(value)
+                else:
+                    result.setdefault(key, value)
     return result
 
 
@@ -50,9 +52,33 @@ def label(case):
     return f"{case['scene'].replace('_', ' ')}, {'lit' if case['lit'] else 'unlit'}, step {case['step']:g}"
 
 
+def vtk_summary(runs):
+    """Factors of speed over some runs, and who is nearer to the truth."""
+    rows = []
+    for method in ("pc", "pips"):
+        for lit in (False, True):
+            chosen = [r for c, r in runs if c["lit"] == lit]
+            if not chosen:
+                continue
+            kinds = [("ray cast", [r[method]["times_faster"] for r in chosen]),
+                     ("whole frame", [r[method]["times_faster_whole"] for r in chosen]),
+                     ("processor", [r[method]["times_faster_processor"] for r in chosen]),
+                     ("first frame", [r["vtk"]["first_ms"] / r[method]["first_ms"] for r in chosen])]
+            rows += [[method, "lit" if lit else "unlit", name, f"{statistics.median(factors):.1f}", f"{min(factors):.1f}",
+                      f"{max(factors):.1f}"] for name, factors in kinds]
+    print(table(["method", "light", "times faster than VTK", "median", "worst", "best"], rows))
+    worse = [label(c) for c, r in runs if r["pc"]["psnr_real"] < r["vtk"]["psnr_double"]]
+    print(f"Rounding: PC is nearer to its double picture than VTK in {len(runs) - len(worse)} of {len(runs)} runs"
+          + (f"; not in {', '.join(worse)}" if worse else "") + ".")
+    gains = [r["pips"]["psnr_reference"] - r["vtk"]["psnr_reference"] for _, r in runs]
+    print(f"Reference: PIPS(1) is nearer than VTK by {statistics.median(gains):.1f} dB in the median, "
+          f"{min(gains):.1f} dB at least.\n")
+
+
 def vtk(result):
     """Every case and thread count: times, factors and errors, then the summary and the fog."""
     runs = [(case, run) for case in result["cases"] for run in case["runs"]]
+    kinds = sorted({(c["step"], r["threads"]) for c, r in runs}, key=lambda kind: (-kind[0], kind[1]))
     print("# Against VTK's fixed-point mapper\n")
     print("<!-- Written by `bench/tables.py vtk`; do not edit. -->\n")
     print(machine_line(result), "\n")
@@ -61,33 +87,18 @@ def vtk(result):
         "termination on, automatic adjustment off, ImageSampleDistance 1.  The same voxels in memory, transfer function, camera,\n"
         "light and step; frames of a turntable, VTK's and ours in turn; times are medians in ms, factors medians of the frames'\n"
         "quotients.  `processor`: the same factor in processor time of the whole frame, which a busy machine does not stretch.\n"
-        "`load`: runnable processes while it ran.\n\n"
+        "`load`: runnable processes while it ran.  Whatever else the machine did, both programs met in turn: the factors count.\n\n"
         "Errors are foreground PSNR in dB.  `VTK, own`: against VTK's own samples in doubles (its phase, its count, its end at\n"
         "T < 1/128, its shades of encoded normals); `ours, own`: against the same picture without rounding (preset `real`). `ref`:\n"
         "against the converged reference.  VTK counts its samples from the near plane, squint from the entry: the two double\n"
         "pictures differ by that phase.\n")
-    print("## Summary\n")
-    rows = []
-    for method in ("pc", "pips"):
-        for lit in (False, True):
-            chosen = [r for c, r in runs if c["lit"] == lit]
-            if not chosen:
-                continue
-            for key, name in (("times_faster", "ray cast"), ("times_faster_whole", "whole frame"),
-                              ("times_faster_processor", "processor")):
-                factors = [r[method][key] for r in chosen]
-                rows.append([method, "lit" if lit else "unlit", name, f"{statistics.median(factors):.1f}",
-                             f"{min(factors):.1f}", f"{max(factors):.1f}"])
-            firsts = [r["vtk"]["first_ms"] / r[method]["first_ms"] for r in chosen]
-            rows.append([method, "lit" if lit else "unlit", "first frame", f"{statistics.median(firsts):.1f}",
-                         f"{min(firsts):.1f}", f"{max(firsts):.1f}"])
-    print(table(["method", "light", "times faster than VTK", "median", "worst", "best"], rows))
-    worse = [label(c) for c, r in runs if r["pc"]["psnr_real"] < r["vtk"]["psnr_double"]]
-    print(f"Rounding: PC is nearer to its double picture than VTK in {len(runs) - len(worse)} of {len(runs)} runs"
-          + (f"; not in {', '.join(worse)}" if worse else "") + ".")
-    gains = [r["pips"]["psnr_reference"] - r["vtk"]["psnr_reference"] for _, r in runs]
-    print(f"Reference: PIPS(1) is nearer than VTK by {statistics.median(gains):.1f} dB in the median, "
-          f"{min(gains):.1f} dB at least.\n")
+    print(f"{len(runs)} of the 80 cases (ten scenes, lit and unlit, steps 1 and 1/2, 1 and 2 threads): "
+          + "; ".join(f"step {step:g} on {threads} thread{'s' if threads > 1 else ''}, "
+                      f"{sum((c['step'], r['threads']) == (step, threads) for c, r in runs)}" for step, threads in kinds)
+          + ".\n")
+    for step in sorted({c["step"] for c, _ in runs}, reverse=True):
+        print(f"## Summary, step {step:g}\n")
+        vtk_summary([(c, r) for c, r in runs if c["step"] == step])
     print("## Times\n")
     print(table(
         ["scene", "threads", "VTK", "PC", "PIPS(1)", "PC faster", "processor", "PIPS(1) faster", "first VTK", "first PC", "load"],
@@ -147,6 +158,6 @@ def frame(result):
 
 if __name__ == "__main__":
     kinds = {"vtk": vtk, "equal-error": equal_error, "frame": frame}
-    if len(sys.argv) != 3 or sys.argv[1] not in kinds:
+    if len(sys.argv) < 3 or sys.argv[1] not in kinds:
         sys.exit(__doc__)
-    kinds[sys.argv[1]](read(sys.argv[2]))
+    kinds[sys.argv[1]](read(sys.argv[2:]))

@@ -37,8 +37,8 @@ struct StoredNeighbourhood {
 bool is_plain(const GradientStage& s, const Volume& volume) {
     return s.rule == GradientRule::central && volume.largest < 1 << 15 && s.weight_bits <= 14 &&
            s.to_normal.rounding == Rounding::rnd_conv && lanes::drops_bits(s.to_first) &&
-           lanes::drops_bits(s.to_second) && lanes::drops_bits(s.to_gradient) &&
-           (s.isotropic || lanes::drops_bits(s.to_scaled));
+           lanes::drops_bits(s.to_second) && lanes::drops_bits(s.to_gradient) && s.to_scaled.shift > 0 &&
+           (s.isotropic || !s.to_scaled.limits);
 }
 /// Says so to the compiler.
 HWY_INLINE void take_as_plain(GradientStage& s) {
