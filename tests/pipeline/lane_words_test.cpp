@@ -164,8 +164,8 @@ void compare_quotients(Comparison<T>& compare) {
         "quotients by one denominator to " + to_string(spec),
         [&](int i) { return i == 1 ? 1 + compare.any(28, false) : compare.any(wide, false); },
         [&](auto x, auto y, auto z) {
-            const auto three = quotients(std::array{x, z, x + z - x}, y, to);
-            return three[0] + three[1] - three[2];
+            const auto three = quotients(std::array{x, z, min(x, z)}, y, to);  // 22 bits each
+            return three[0] + shift_left(three[1], 2) + shift_left(three[2], 5);
         });
     // Ties, and quotients a hair's breadth off one.
     compare(
