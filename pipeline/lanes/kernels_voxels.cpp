@@ -252,7 +252,9 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
     const unsigned rows = rows_of(plan.gradient.rule);
     const bool offsets_fit =
         volume.voxels() < std::numeric_limits<Word>::max() / static_cast<std::int64_t>(sizeof(T));
-    const bool cross = plan.gradient.rule == GradientRule::central;
+    const auto wants_inner = [cross = plan.gradient.rule == GradientRule::central](int row) {
+        return cross && lanes::is_outer_row(row % 4, row / 4);
+    };
     const auto clamped = [](std::int64_t i, std::int64_t end) {
         return std::clamp<std::int64_t>(i, 0, end - 1);
     };
@@ -279,7 +281,7 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
                     for (int row = 0; row < 16; ++row) {
                         if (!(rows >> row & 1)) continue;
                         const T* line = data + n.x * (row % 4 + n.y * (row / 4));
-                        if (cross && lanes::is_outer_row(row % 4, row / 4)) {
+                        if (wants_inner(row)) {
                             hn::Store(gathered_inner_pair(line, first), d, pair[2 * row].v + at);
                             continue;
                         }
@@ -307,7 +309,7 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
                         else
                             return load_quads(address);
                     }();
-                    const bool inner = cross && lanes::is_outer_row(row % 4, row / 4);
+                    const bool inner = wants_inner(row);
                     hn::Store(inner ? inner_pair(words[0], words[1]) : words[0], d, pair[2 * row].v + at);
                     hn::Store(words[1], d, pair[2 * row + 1].v + at);
                 }
@@ -320,7 +322,7 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
                     const T* line = data + n.x * (clamped(cell[1].v[i] + row % 4 - 1, n.y) +
                                                   n.y * clamped(cell[2].v[i] + row / 4 - 1, n.z));
                     const auto voxel = [&](int x) { return Word{line[clamped(cell[0].v[i] + x - 1, n.x)]}; };
-                    const bool inner = cross && lanes::is_outer_row(row % 4, row / 4);
+                    const bool inner = wants_inner(row);
                     pair[2 * row].v[i] = inner ? voxel(1) | voxel(2) << 16 : voxel(0) | voxel(1) << 16;
                     pair[2 * row + 1].v[i] = voxel(2) | voxel(3) << 16;
                 }
