@@ -9,9 +9,9 @@
 #include <fmt/format.h>
 
 #include "pipeline/classification/methods.h"
-#include "pipeline/preintegration/pi2d.h"
-#include "pipeline/preintegration/prefix_tables.h"
-#include "pipeline/presets.h"
+#include "pipeline/classification/tables/pi2d_table.h"
+#include "pipeline/classification/tables/prefix_tables.h"
+#include "scene/presets.h"
 
 namespace {
 

@@ -12,13 +12,13 @@
 #include <vector>
 
 #include "core/error.h"
-#include "pipeline/preintegration/exact_slab.h"
-#include "pipeline/preintegration/leg.h"
-#include "pipeline/preintegration/pc.h"
-#include "pipeline/preintegration/pi1d.h"
-#include "pipeline/preintegration/pi2d.h"
-#include "pipeline/preintegration/pips.h"
-#include "tests/pipeline/classification_cases.h"
+#include "pipeline/classification/tables/exact_slab.h"
+#include "pipeline/classification/tables/legendre.h"
+#include "pipeline/classification/tables/pi1d_table.h"
+#include "pipeline/classification/tables/pi2d_table.h"
+#include "pipeline/classification/tables/power_series.h"
+#include "tests/pipeline/classification/classification_cases.h"
+#include "truth/post_classification.h"
 
 namespace {
 

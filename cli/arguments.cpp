@@ -3,8 +3,8 @@
 
 #include "core/error.h"
 #include "pipeline/record.h"
-#include "pipeline/scene.h"
-#include "pipeline/sweep/sweep_file.h"
+#include "scene/scene.h"
+#include "studies/sweep/sweep_file.h"
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>

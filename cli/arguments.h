@@ -2,7 +2,7 @@
 #pragma once
 
 #include "pipeline/render.h"
-#include "pipeline/search/search.h"
+#include "studies/search/search.h"
 
 #include <cstdint>
 #include <optional>

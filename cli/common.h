@@ -2,7 +2,7 @@
 #pragma once
 
 #include "cli/arguments.h"
-#include "pipeline/plan.h"
+#include "pipeline/plan/plan.h"
 
 #include <nlohmann/json_fwd.hpp>
 

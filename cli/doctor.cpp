@@ -1,6 +1,6 @@
 // squint doctor: what this installation is made of, and whether it renders the bits it should.
 #include "cli/common.h"
-#include "pipeline/lanes/kernels.h"
+#include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/record.h"
 
 #include <OpenImageIO/imageio.h>

@@ -2,7 +2,7 @@
 // slab against the exact integral, or why a method is refused.
 #include "cli/common.h"
 #include "core/error.h"
-#include "pipeline/slab_check.h"
+#include "truth/slab_check.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>

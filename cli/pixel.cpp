@@ -1,7 +1,7 @@
 // squint pixel: every wire of one ray, sample by sample.
 #include "cli/common.h"
 #include "core/error.h"
-#include "pipeline/model.h"
+#include "pipeline/machines/model.h"
 #include "pipeline/record.h"
 
 #include <fmt/format.h>

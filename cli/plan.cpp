@@ -1,6 +1,6 @@
 // squint plan: what a scene exercises, and what was left out and why.
 #include "cli/common.h"
-#include "pipeline/lanes/lane_renderer.h"
+#include "pipeline/machines/lanes/lane_renderer.h"
 #include "pipeline/record.h"
 
 #include <fmt/format.h>

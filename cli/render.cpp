@@ -3,7 +3,7 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "pipeline/record.h"
-#include "pipeline/reference.h"
+#include "truth/reference.h"
 
 #include <fmt/format.h>
 #include <unistd.h>

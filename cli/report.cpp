@@ -1,5 +1,5 @@
 // squint report: what a sweep found, as a page, or as numbers for programs and papers.
-#include "pipeline/sweep/report.h"
+#include "studies/sweep/report.h"
 #include "cli/common.h"
 #include "core/atomic_file.h"
 #include "core/error.h"

@@ -1,5 +1,5 @@
 // squint search: the cheapest formats under an error, as a preset file, with the way there as a run.
-#include "pipeline/search/search.h"
+#include "studies/search/search.h"
 #include "cli/common.h"
 
 #include <fmt/format.h>

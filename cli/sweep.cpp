@@ -1,7 +1,7 @@
 // squint sweep: every point of a sweep file, into a folder that a killed run goes on with.
 #include "cli/common.h"
 #include "core/error.h"
-#include "pipeline/sweep/run.h"
+#include "studies/sweep/run.h"
 
 #include <fmt/format.h>
 

@@ -139,8 +139,8 @@ HWY_INLINE std::array<Lanes<T, K>, N> quotients(const std::array<Lanes<T, K>, N>
 }
 }  // namespace lanes_detail
 
-/// words.h's.  32-bit lanes: results of at most 22 bits, denominators below 2^29 (pipeline/plan.cpp checks).
-/// Four roundings of floats are one at most of such a result.  Saturating wires only.
+/// words.h's.  32-bit lanes: results of at most 22 bits, denominators below 2^29 (pipeline/plan/plan.cpp
+/// checks). Four roundings of floats are one at most of such a result.  Saturating wires only.
 template <class T, KnownRescales K>
 HWY_INLINE Lanes<T, K> quotient(Lanes<T, K> numerator, Lanes<T, K> denominator, const Rescale& to) {
     return lanes_detail::quotients(std::array{numerator}, denominator, to)[0];

@@ -8,7 +8,7 @@
 // Audited      the model, counting what every wire carried
 // Real<T>      no rounding: raw units in floating point; shifts are exact multiplications
 // Range        intervals: what a stage's exact results can reach, and so how wide a word it needs
-//              (pipeline/plan_words.cpp)
+//              (pipeline/plan/ranges.cpp)
 // Lanes        many samples side by side: lanes.h
 //
 // Wide<W>      beside W, for the few numbers that need more bits than all others: at the end of this file

@@ -2,15 +2,15 @@
 // classification M.
 #pragma once
 
-#include "pipeline/plan.h"
+#include "pipeline/plan/plan.h"
 
 #include "pipeline/classification/methods.h"
-#include "pipeline/compositing.h"
-#include "pipeline/gradient.h"
-#include "pipeline/interpolation.h"
-#include "pipeline/location.h"
-#include "pipeline/ray_setup.h"
-#include "pipeline/shading.h"
+#include "pipeline/stages/compositing.h"
+#include "pipeline/stages/gradient.h"
+#include "pipeline/stages/interpolation.h"
+#include "pipeline/stages/location.h"
+#include "pipeline/stages/ray_setup.h"
+#include "pipeline/stages/shading.h"
 
 #include <algorithm>
 #include <array>

@@ -4,7 +4,7 @@
 
 #include "core/compare.h"
 #include "core/image.h"
-#include "pipeline/plan.h"
+#include "pipeline/plan/plan.h"
 #include "pipeline/render.h"
 
 #include <nlohmann/json_fwd.hpp>

@@ -1,8 +1,8 @@
 #include "pipeline/render.h"
 
 #include "core/error.h"
-#include "pipeline/lanes/lane_renderer.h"
-#include "pipeline/model.h"
+#include "pipeline/machines/lanes/lane_renderer.h"
+#include "pipeline/machines/model.h"
 
 #include <fmt/format.h>
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/image.h"
-#include "pipeline/plan.h"
+#include "pipeline/plan/plan.h"
 
 #include <array>
 #include <atomic>

@@ -4,9 +4,9 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/volume_source.h"
-#include "pipeline/model.h"
+#include "pipeline/machines/model.h"
 #include "pipeline/record.h"
-#include "pipeline/reference.h"
+#include "truth/reference.h"
 
 #include <fmt/format.h>
 

@@ -6,7 +6,7 @@
 #include "core/portable_math.h"
 #include "core/transfer_function.h"
 #include "fixedpoint/words.h"
-#include "pipeline/scene.h"
+#include "scene/scene.h"
 
 #include <array>
 #include <cstdint>
@@ -121,8 +121,8 @@ void require_range(const WireSpecs& specs, Wire wire, double largest, const char
 }  // namespace squint
 #endif
 
-#include "pipeline/interpolation.h"
-#include "pipeline/location.h"
+#include "pipeline/stages/interpolation.h"
+#include "pipeline/stages/location.h"
 
 #include <hwy/highway.h>
 #if defined(SQUINT_PIPELINE_CLASSIFICATION_ENTRIES_TARGET) == defined(HWY_TARGET_TOGGLE)

@@ -1,9 +1,9 @@
 #include "pipeline/classification/moments.h"
 
 #include "core/error.h"
-#include "pipeline/classification/moment_rows.h"
-#include "pipeline/preintegration/leg.h"
-#include "pipeline/preintegration/pips.h"
+#include "pipeline/classification/tables/legendre.h"
+#include "pipeline/classification/tables/moment_rows.h"
+#include "pipeline/classification/tables/power_series.h"
 
 #include <fmt/format.h>
 

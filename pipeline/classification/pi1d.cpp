@@ -1,6 +1,6 @@
 #include "pipeline/classification/pi1d.h"
 
-#include "pipeline/preintegration/pi1d.h"
+#include "pipeline/classification/tables/pi1d_table.h"
 
 namespace squint {
 

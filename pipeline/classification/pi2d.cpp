@@ -1,6 +1,6 @@
 #include "pipeline/classification/pi2d.h"
 
-#include "pipeline/preintegration/pi2d.h"
+#include "pipeline/classification/tables/pi2d_table.h"
 
 #include <fmt/format.h>
 

@@ -1,7 +1,7 @@
 #include "pipeline/classification/pips.h"
 
-#include "pipeline/classification/light_sums.h"
-#include "pipeline/preintegration/linear_entries.h"
+#include "pipeline/classification/tables/light_sums.h"
+#include "pipeline/classification/tables/linear_entries.h"
 
 #include <array>
 #include <cmath>

@@ -1,8 +1,8 @@
 #include "pipeline/classification/prefix.h"
 
-#include "pipeline/classification/light_sums.h"
-#include "pipeline/preintegration/linear_entries.h"
-#include "pipeline/preintegration/opaque_prediction.h"
+#include "pipeline/classification/tables/light_sums.h"
+#include "pipeline/classification/tables/linear_entries.h"
+#include "pipeline/classification/tables/opaque_prediction.h"
 
 #include <algorithm>
 #include <array>

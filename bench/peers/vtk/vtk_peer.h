@@ -4,7 +4,7 @@
 
 #include "core/camera.h"
 #include "core/image.h"
-#include "pipeline/plan.h"
+#include "pipeline/plan/plan.h"
 
 #include <memory>
 

@@ -1,0 +1,132 @@
+#include "pipeline/machines/lanes/cell_blocks.h"
+
+#include "pipeline/machines/lanes/kept.h"
+
+#include <sys/mman.h>
+
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+
+namespace squint::lanes {
+namespace {
+
+constexpr std::int32_t kNotBuilt = -1;
+
+std::int64_t blocks_along(std::int64_t voxels) {
+    return (std::max<std::int64_t>(voxels - 1, 1) + (1 << CellBlocks::kBits) - 1) >> CellBlocks::kBits;
+}
+Index3 blocks_of(const Volume& volume) {
+    return Index3(blocks_along(volume.dims.x), blocks_along(volume.dims.y), blocks_along(volume.dims.z));
+}
+int cell_bytes_of(const Volume& volume) {
+    return volume.type == ScalarType::u8 ? 8 : 16;
+}
+/// The volume without its voxels' ownership: what is kept for them must not keep them alive.
+Volume borrowed(const Volume& volume) {
+    Volume view = volume;
+    view.data = std::shared_ptr<const void>(std::shared_ptr<const void>(), volume.data.get());
+    return view;
+}
+
+}  // namespace
+
+std::int64_t CellBlocks::bytes_of_all(const Volume& volume) {
+    const Index3 n = blocks_of(volume);
+    return n.x * n.y * n.z * kCells * cell_bytes_of(volume);
+}
+
+std::int64_t CellBlocks::table_bytes_of(const Volume& volume) {
+    const Index3 n = blocks_of(volume);
+    return n.x * n.y * n.z * static_cast<std::int64_t>(sizeof(std::int32_t));
+}
+
+CellBlocks::CellBlocks(const Volume& volume, std::int64_t most_bytes)
+    : volume_(borrowed(volume)), blocks_(blocks_of(volume)) {
+    block_bytes_ = std::int64_t{kCells} * cell_bytes_of(volume);
+    const std::int64_t all = blocks_.x * blocks_.y * blocks_.z;
+    // Cells are counted in 32 bits.
+    room_ = std::min({all, most_bytes / block_bytes_, std::int64_t{0x7fffffff} / kCells});
+    if (room_ <= 0) return;
+    slots_.assign(static_cast<std::size_t>(all), kNotBuilt);
+    const auto bytes = static_cast<std::size_t>(room_ * block_bytes_);
+    void* place =
+        mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    if (place == MAP_FAILED) {
+        room_ = 0, slots_.clear();
+        return;
+    }
+    madvise(place, bytes, MADV_HUGEPAGE);
+    data_ = static_cast<std::uint8_t*>(place);
+}
+
+CellBlocks::~CellBlocks() {
+    if (data_) munmap(data_, static_cast<std::size_t>(room_ * block_bytes_));
+}
+
+std::int64_t CellBlocks::bytes() const {
+    const std::lock_guard lock(mutex_);
+    return taken_ * block_bytes_ + static_cast<std::int64_t>(slots_.size() * sizeof(slots_[0]));
+}
+
+std::vector<std::int32_t> CellBlocks::slots() const {
+    const std::lock_guard lock(mutex_);
+    return slots_;
+}
+
+void CellBlocks::build(const std::function<bool(std::int64_t)>& wanted) {
+    const std::lock_guard lock(mutex_);
+    std::vector<std::int64_t> fresh;
+    for (std::size_t i = 0; i < slots_.size() && taken_ + static_cast<std::int64_t>(fresh.size()) < room_;
+         ++i)
+        if (slots_[i] == kNotBuilt && wanted(static_cast<std::int64_t>(i)))
+            fresh.push_back(static_cast<std::int64_t>(i));
+    const auto fill_block = [&](std::size_t i) {
+        const std::int64_t place = taken_ + static_cast<std::int64_t>(i);
+        std::uint8_t* cells = data_ + place * block_bytes_;
+        if (volume_.type == ScalarType::u8)
+            fill(fresh[i], cells);
+        else
+            fill(fresh[i], reinterpret_cast<std::uint16_t*>(cells));
+        slots_[static_cast<std::size_t>(fresh[i])] = static_cast<std::int32_t>(place * kCells);
+    };
+    // A thread that waits here must not take up work that asks for this lock.
+    tbb::this_task_arena::isolate([&] { tbb::parallel_for(std::size_t{0}, fresh.size(), fill_block); });
+    taken_ += static_cast<std::int64_t>(fresh.size());
+}
+
+template <class T>
+void CellBlocks::fill(std::int64_t index, T* cells) const {
+    constexpr std::int64_t kSide = 1 << kBits;
+    const Index3 n = volume_.dims;
+    const Index3 low(index % blocks_.x * kSide, index / blocks_.x % blocks_.y * kSide,
+                     index / (blocks_.x * blocks_.y) * kSide);
+    const T* voxels = static_cast<const T*>(volume_.data.get());
+    // Beyond the volume its last voxels stand again; no sample has such a cell.
+    std::int64_t x[kSide + 1];
+    for (std::int64_t i = 0; i <= kSide; ++i) x[i] = std::min(low.x + i, n.x - 1);
+    for (std::int64_t k = 0; k < kSide; ++k)
+        for (std::int64_t j = 0; j < kSide; ++j) {
+            const T* row[4];  // y fastest
+            for (std::int64_t r = 0; r < 4; ++r)
+                row[r] =
+                    voxels +
+                    (std::min(low.z + k + r / 2, n.z - 1) * n.y + std::min(low.y + j + r % 2, n.y - 1)) * n.x;
+            for (std::int64_t i = 0; i < kSide; ++i)
+                for (const T* line : row) *cells++ = line[x[i]], *cells++ = line[x[i + 1]];
+        }
+}
+
+std::shared_ptr<CellBlocks> cell_blocks(const Volume& volume, std::int64_t most_bytes, bool strictly) {
+    static KeptPerVolume<CellBlocks> kept;
+    const std::int64_t block = std::int64_t{CellBlocks::kCells} * cell_bytes_of(volume);
+    const std::int64_t wanted = std::min(most_bytes, CellBlocks::bytes_of_all(volume)) / block * block;
+    return kept.find(
+        volume, [&] { return std::make_shared<CellBlocks>(volume, wanted); },
+        [&](const CellBlocks& cells) {
+            return cells.room() == wanted || (!strictly && cells.room() >= wanted / 2);
+        });
+}
+
+}  // namespace squint::lanes

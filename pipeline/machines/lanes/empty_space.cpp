@@ -1,0 +1,211 @@
+#include "pipeline/machines/lanes/empty_space.h"
+
+#include "pipeline/machines/lanes/kept.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+namespace squint::lanes {
+namespace {
+
+// Ranges of the blocks along x that lie at y, z of the box.
+template <class T>
+void measure_row(const Volume& volume, BlockRanges& ranges, std::int64_t y, std::int64_t z) {
+    const T* data = static_cast<const T*>(volume.data.get());
+    const Index3 n = volume.dims, &low = ranges.box.low, &blocks = ranges.box.blocks;
+    std::uint16_t* smallest = ranges.smallest.data() + (z * blocks.y + y) * blocks.x;
+    std::uint16_t* largest = ranges.largest.data() + (z * blocks.y + y) * blocks.x;
+    // The voxels of each line, folded onto its blocks; a block's last voxel is its neighbour's first.
+    const auto first = [](std::int64_t block) { return block * kBlock; };
+    const auto last = [](std::int64_t block, std::int64_t voxels) {
+        return std::min((block + 1) * kBlock, voxels - 1);
+    };
+    const std::int64_t from = first(low.x), end = last(low.x + blocks.x - 1, n.x) + 1;
+    bool zeros = false;  // of lines that are known to be zero
+    for (std::int64_t k = first(low.z + z); k <= last(low.z + z, n.z); ++k)
+        for (std::int64_t j = first(low.y + y); j <= last(low.y + y, n.y); ++j) {
+            const std::int64_t line = (k * n.y + j) * n.x;
+            if (volume.known_zero(line + from, line + end)) {
+                zeros = true;
+                continue;
+            }
+            const T* row = data + line;
+            for (std::int64_t x = 0; x < blocks.x; ++x) {
+                const auto x0 = first(low.x + x), x1 = last(low.x + x, n.x);
+                T least = row[x0], greatest = row[x0];
+                for (std::int64_t i = x0 + 1; i <= x1; ++i)
+                    least = std::min(least, row[i]), greatest = std::max(greatest, row[i]);
+                smallest[x] = std::min<std::uint16_t>(smallest[x], least);
+                largest[x] = std::max<std::uint16_t>(largest[x], greatest);
+            }
+        }
+    if (zeros) std::fill_n(smallest, blocks.x, std::uint16_t{0});
+}
+
+// Chebyshev distance to the nearest zero: one more than the nearest of a block's 26 neighbours has, 13 of
+// them on the way forth and 13 on the way back.
+void spread(std::vector<std::uint8_t>& distance, const Index3& blocks) {
+    const auto nx = static_cast<std::size_t>(blocks.x);
+    // Of the rows already passed, with a block more on either side.
+    std::vector<std::uint8_t> nearest(nx + 2);
+    const auto pass = [&](bool forth) {
+        const std::int64_t before = forth ? -1 : 1;
+        const auto at = [&](std::int64_t i, std::int64_t count) { return forth ? i : count - 1 - i; };
+        for (std::int64_t k = 0; k < blocks.z; ++k)
+            for (std::int64_t j = 0; j < blocks.y; ++j) {
+                const std::int64_t z = at(k, blocks.z), y = at(j, blocks.y);
+                const auto row = [&](std::int64_t dy, std::int64_t dz) -> std::uint8_t* {
+                    const bool inside = y + dy >= 0 && y + dy < blocks.y && z + dz >= 0 && z + dz < blocks.z;
+                    return inside ? distance.data() + ((z + dz) * blocks.y + y + dy) * blocks.x : nullptr;
+                };
+                std::fill(nearest.begin(), nearest.end(), std::uint8_t{254});
+                for (const std::uint8_t* passed :
+                     {row(before, 0), row(-1, before), row(0, before), row(1, before)})
+                    for (std::size_t x = 0; passed && x < nx; ++x)
+                        nearest[x + 1] = std::min(nearest[x + 1], passed[x]);
+                std::uint8_t* here = row(0, 0);
+                for (std::size_t x = 0; x < nx; ++x) {
+                    const std::uint8_t around =
+                        std::min(nearest[x], std::min(nearest[x + 1], nearest[x + 2]));
+                    here[x] = std::min(here[x], static_cast<std::uint8_t>(around + 1));
+                }
+                int last = 254;
+                for (std::size_t i = 0; i < nx; ++i) {
+                    std::uint8_t& d = here[forth ? i : nx - 1 - i];
+                    last = std::min<int>(d, last + 1);
+                    d = static_cast<std::uint8_t>(last);
+                }
+            }
+    };
+    pass(true), pass(false);
+}
+
+// At each corner of blocks, the least distance of the eight about it.
+void clear_corners(EmptySpace& space) {
+    const Index3 blocks = space.box.blocks, n = blocks + Index3(1);
+    const auto count = static_cast<std::size_t>(n.x * n.y * n.z);
+    space.corners = n;
+    space.clear.reserve(count + 3);  // lanes read four bytes at any of them
+    space.clear.assign(count, 255);
+    tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
+        for (std::int64_t y = 0; y < n.y; ++y) {
+            std::uint8_t* here = space.clear.data() + (z * n.y + y) * n.x;
+            for (const std::int64_t k : {z - 1, z})
+                for (const std::int64_t j : {y - 1, y}) {
+                    if (k < 0 || k >= blocks.z || j < 0 || j >= blocks.y) continue;
+                    const std::uint8_t* row = space.distance.data() + (k * blocks.y + j) * blocks.x;
+                    for (std::int64_t x = 0; x < blocks.x; ++x) {
+                        here[x] = std::min(here[x], row[x]);
+                        here[x + 1] = std::min(here[x + 1], row[x]);
+                    }
+                }
+        }
+    });
+}
+
+// Each block's range with its 26 neighbours': axis by axis.
+void widen(BlockRanges& ranges) {
+    const Index3 n = ranges.box.blocks;
+    const auto pass = [&](std::int64_t stride, std::int64_t count) {
+        const BlockRanges old = ranges;
+        tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
+            for (std::int64_t i = z * n.x * n.y; i < (z + 1) * n.x * n.y; ++i) {
+                const std::int64_t place = i / stride % count;
+                const auto at = static_cast<std::size_t>(i);
+                for (const std::int64_t step : {std::int64_t{-1}, std::int64_t{1}}) {
+                    if (place + step < 0 || place + step >= count) continue;
+                    const auto other = static_cast<std::size_t>(i + step * stride);
+                    ranges.smallest[at] = std::min(ranges.smallest[at], old.smallest[other]);
+                    ranges.largest[at] = std::max(ranges.largest[at], old.largest[other]);
+                }
+            }
+        });
+    };
+    pass(1, n.x), pass(n.x, n.y), pass(n.x * n.y, n.z);
+}
+
+std::shared_ptr<BlockRanges> measure(const Volume& volume, const BlockBox& box) {
+    auto ranges = std::make_shared<BlockRanges>();
+    ranges->box = box;
+    const auto count = static_cast<std::size_t>(box.count());
+    ranges->smallest.assign(count, 0xffff), ranges->largest.assign(count, 0);
+    tbb::parallel_for(std::int64_t{0}, box.blocks.z, [&](std::int64_t z) {
+        for (std::int64_t y = 0; y < box.blocks.y; ++y)
+            if (volume.type == ScalarType::u8)
+                measure_row<std::uint8_t>(volume, *ranges, y, z);
+            else
+                measure_row<std::uint16_t>(volume, *ranges, y, z);
+    });
+    return ranges;
+}
+
+}  // namespace
+
+bool BlockBox::holds(const BlockBox& other) const {
+    for (int a = 0; a < 3; ++a)
+        if (other.low[a] < low[a] || other.low[a] + other.blocks[a] > low[a] + blocks[a]) return false;
+    return true;
+}
+
+BlockBox all_blocks_of(const Volume& volume) {
+    const auto cells = [](std::int64_t n) {
+        return std::max<std::int64_t>((n - 1 + kBlock - 1) / kBlock, 1);
+    };
+    return {Index3(0), Index3(cells(volume.dims.x), cells(volume.dims.y), cells(volume.dims.z))};
+}
+
+std::shared_ptr<const BlockRanges> block_ranges(const Volume& volume, const BlockBox& box) {
+    static KeptPerVolume<BlockRanges> kept;
+    return kept.find(
+        volume, [&] { return measure(volume, box); },
+        [&](const BlockRanges& ranges) { return ranges.box.holds(box); });
+}
+
+EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, int reach, int entry_reach) {
+    // visible_before[i]: entries below i in which anything can be seen.
+    std::vector<int> visible_before(static_cast<std::size_t>(entries.size()) + 1, 0);
+    for (std::size_t i = 0; i < entries.entry.size(); ++i)
+        visible_before[i + 1] = visible_before[i] + entries.entry[i].is_visible();
+    // A sample's rounding may reach the next entry: one more on either side.
+    const int last = entries.size() - 1, more = 1 + entry_reach;
+    const auto entry_at = [&](double place) {
+        return static_cast<std::size_t>(std::clamp<double>(place, 0, last));
+    };
+    std::uint16_t greatest = 0;
+    for (const std::uint16_t scalar : ranges.largest) greatest = std::max(greatest, scalar);
+    // Visible entries below those that a scalar may reach.
+    std::vector<int> before_from(greatest + 1U), before_to(greatest + 1U);
+    for (std::size_t scalar = 0; scalar <= greatest; ++scalar) {
+        const double entry = entries.coordinate(static_cast<double>(scalar));
+        before_from[scalar] = visible_before[entry_at(std::floor(entry) - more)];
+        before_to[scalar] = visible_before[entry_at(std::ceil(entry) + more) + 1];
+    }
+
+    BlockRanges widened;
+    if (reach > 0) widened = ranges;
+    for (int i = 0; i < reach; ++i) widen(widened);
+    const BlockRanges& seen = reach > 0 ? widened : ranges;
+    EmptySpace space;
+    space.box = ranges.box;
+    const Index3 n = space.box.blocks;
+    space.distance.assign(ranges.smallest.size(), 255);
+    std::atomic<std::int64_t> visible{0};
+    tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
+        std::int64_t here = 0;
+        for (std::int64_t i = z * n.x * n.y; i < (z + 1) * n.x * n.y; ++i) {
+            const auto at = static_cast<std::size_t>(i);
+            if (before_to[seen.largest[at]] > before_from[seen.smallest[at]]) space.distance[at] = 0, ++here;
+        }
+        visible += here;
+    });
+    space.visible_blocks = visible;
+    spread(space.distance, n);
+    clear_corners(space);
+    return space;
+}
+
+}  // namespace squint::lanes

@@ -1,0 +1,170 @@
+// Stage 6 in lanes: every form.
+#include "pipeline/machines/lanes/targets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "pipeline/machines/lanes/kernels_compositing.cpp"
+#include <hwy/foreach_target.h>
+
+#include "fixedpoint/float_lanes.h"
+#include "fixedpoint/lanes.h"
+#include "pipeline/machines/lanes/kernels.h"
+#include "pipeline/machines/lanes/plain.h"
+#include "pipeline/stages/compositing.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+namespace {
+
+/// The default's compositing: form w, straight colours, sums that no limit meets.  A transparent slab is the
+/// identity.
+bool is_plain(const CompositingStage& s) {
+    return s.form == CompositingForm::w && !s.premultiplied &&
+           s.contribution_fraction == s.transparency_fraction && lanes::drops_bits(s.to_contribution) &&
+           lanes::drops_bits(s.to_color) && lanes::does_nothing(s.to_color_sum) &&
+           lanes::does_nothing(s.to_transparency);
+}
+/// Its products are those of numbers from 0 to 1 of 15 bits.
+bool is_of_units(const CompositingStage& s) {
+    const auto drops_15 = [](const Rescale& to) { return to.shift == 15 && to.to_even == 1; };
+    return is_plain(s) && s.of_units && s.alpha_fraction == 15 && s.color_fraction == 15 &&
+           s.transparency_fraction == 15 && drops_15(s.to_contribution) && drops_15(s.to_color);
+}
+/// Says so to the compiler.
+HWY_INLINE void take_as_plain(CompositingStage& s) {
+    s.form = CompositingForm::w, s.premultiplied = false;
+    s.contribution_fraction = s.transparency_fraction;
+    lanes::take_as_dropping_bits(s.to_contribution), lanes::take_as_dropping_bits(s.to_color);
+    lanes::take_as_doing_nothing(s.to_color_sum), lanes::take_as_doing_nothing(s.to_transparency);
+}
+
+template <class L, bool kPlain, bool kKeepsT>
+void composite_rows(const Plan& plan, const lanes::RayPacket& packet, int steps,
+                    const lanes::Samples& samples, lanes::PixelPacket& pixels, lanes::Batch& between) {
+    CompositingStage stage = plan.compositing;
+    if constexpr (kPlain) take_as_plain(stage);
+    const bool backwards = stage.form == CompositingForm::back_to_front;
+    // A slab without opacity changes nothing: of rays that have ended, and of rows in which nothing is seen.
+    const bool transparent_is_identity = kPlain || (plan.skips_empty_space && !stage.premultiplied);
+    const L one = constant<L>(1), zero = constant<L>(0);
+    for (int r = 0; r < lanes::kRays; r += static_cast<int>(L::count())) {
+        Accumulated<L> pixel{
+            {load<L>(pixels.color[0].v + r), load<L>(pixels.color[1].v + r), load<L>(pixels.color[2].v + r)},
+            load<L>(pixels.transparency.v + r)};
+        const L slabs = load_whole<L>(packet.slabs.v + r);
+        auto active = zero < load_whole<L>(pixels.active.v + r);
+        L count = load_whole<L>(pixels.samples.v + r);
+        const auto keep_transparency = [&](int row) {
+            if constexpr (kKeepsT) store(pixel.transparency, between.v + row * lanes::kRays + r);
+        };
+        for (int i = 0; i < steps; ++i) {
+            const int step = backwards ? steps - 1 - i : i;
+            const int at = step * lanes::kRays + r;
+            keep_transparency(backwards ? step + 1 : step);
+            const auto here = active & (constant<L>(samples.first + step) < slabs);
+            const L alpha = load<L>(samples.alpha.v + at);
+            const std::array<L, 3> color{load<L>(samples.color[0].v + at), load<L>(samples.color[1].v + at),
+                                         load<L>(samples.color[2].v + at)};
+            count = count + select(here, one, zero);
+            if (transparent_is_identity && !any(zero < alpha)) {
+                if (!backwards) active = here;
+                continue;
+            }
+            Accumulated<L> next = pixel;
+            composite(stage, next, color, alpha);
+            for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
+                pixel.color[c] = select(here, next.color[c], pixel.color[c]);
+            });
+            pixel.transparency = select(here, next.transparency, pixel.transparency);
+            if (!backwards) active = here & goes_on(stage, pixel);
+        }
+        keep_transparency(backwards ? 0 : steps);
+        for_three([&](std::size_t c) SQUINT_WRITTEN_OUT { store(pixel.color[c], pixels.color[c].v + r); });
+        store(pixel.transparency, pixels.transparency.v + r);
+        store_whole(count, pixels.samples.v + r);
+        store_whole(select(active, one, zero), pixels.active.v + r);
+    }
+}
+
+/// Transparency alone, front to back: it does not wait for colours.
+template <class L, bool kPlain>
+void hide_rows(const Plan& plan, const lanes::RayPacket& packet, const lanes::PixelPacket& pixels, int steps,
+               lanes::Samples& samples) {
+    CompositingStage stage = plan.compositing;
+    if constexpr (kPlain) take_as_plain(stage);
+    const L zero = constant<L>(0);
+    for (int r = 0; r < lanes::kRays; r += static_cast<int>(L::count())) {
+        L transparency = load<L>(pixels.transparency.v + r);
+        const L slabs = load_whole<L>(packet.slabs.v + r);
+        auto active = zero < load_whole<L>(pixels.active.v + r);
+        for (int step = 0; step < steps; ++step) {
+            const int at = step * lanes::kRays + r;
+            const auto here = active & (constant<L>(samples.first + step) < slabs);
+            const L alpha = load<L>(samples.alpha.v + at);
+            store(select(here, alpha, zero), samples.alpha.v + at);
+            Accumulated<L> next{{zero, zero, zero}, transparency};
+            composite(stage, next, {zero, zero, zero}, alpha);
+            transparency = next.transparency = select(here, next.transparency, transparency);
+            active = here & goes_on(stage, next);
+        }
+    }
+}
+
+/// One word a pixel from a packet, as model.h's to_double has it.
+HWY_INLINE Reals values_of(bool are_floats, const lanes::Word* words) {
+    const hn::Rebind<lanes::Word, Reals::D> narrow;
+    const auto bits = hn::LoadU(narrow, words);
+    if (!are_floats) return Reals(hn::PromoteTo(Reals::D(), bits));
+    return Reals(hn::PromoteTo(Reals::D(), hn::BitCast(hn::Rebind<float, Reals::D>(), bits)));
+}
+
+void store_colors(const Plan& plan, const lanes::PixelPacket& pixels, const lanes::PacketPlace& place,
+                  Image& image) {
+    const hn::Rebind<float, Reals::D> narrow;
+    lanes::RealRow color[4];
+    for (int r = 0; r < lanes::kRays; r += Reals::count()) {
+        const auto value = [&](const lanes::Row& row) { return values_of(plan.float32, row.v + r); };
+        const std::array<Reals, 4> values = color_of(
+            plan.compositing,
+            Accumulated<Reals>{{value(pixels.color[0]), value(pixels.color[1]), value(pixels.color[2])},
+                               value(pixels.transparency)});
+        for (std::size_t c = 0; c < 4; ++c)
+            hn::StoreU(hn::DemoteTo(narrow, values[c].v), narrow, color[c].v + r);
+    }
+    const int columns = std::min(lanes::kSide, place.right - place.left),
+              rows = std::min(lanes::kSide, place.bottom - place.top);
+    for (std::size_t c = 0; c < 4; ++c)  // R G B A come first
+        for (int row = 0; row < rows; ++row) {
+            const auto at =
+                static_cast<std::size_t>(place.top + row) * static_cast<std::size_t>(image.width) +
+                static_cast<std::size_t>(place.left);
+            std::copy_n(color[c].v + row * lanes::kSide, columns, image.channels[c].values.data() + at);
+        }
+}
+
+}  // namespace
+
+void compositing_kernel_of(const Plan& plan, const lanes::StageWay& way, lanes::StageKernels& kernels) {
+    lanes::with_word<Lanes, KnownRescales::halves_to_even>(way, [&]<class L>() {
+        kernels.hide = is_plain(plan.compositing) ? &hide_rows<L, true> : &hide_rows<L, false>;
+        kernels.composite = plan.scene.output.depth      ? &composite_rows<L, false, true>
+                            : is_plain(plan.compositing) ? &composite_rows<L, true, false>
+                                                         : &composite_rows<L, false, false>;
+    });
+    if (way.bits == 32 && !way.is_float && is_of_units(plan.compositing)) {
+        using L = Lanes<std::int32_t, KnownRescales::unit_products>;
+        kernels.hide = &hide_rows<L, true>;
+        if (!plan.scene.output.depth) kernels.composite = &composite_rows<L, true, false>;
+    }
+    kernels.store_colors = &store_colors;
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace squint::lanes {
+void compositing_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels) {
+    SQUINT_CALL_TARGET(target, compositing_kernel_of, plan, way, kernels)
+}
+}  // namespace squint::lanes
+#endif

@@ -1,0 +1,66 @@
+// MIP, MinIP and average in lanes: the samples of a ray onto the one scalar that stands for it.
+#include "pipeline/machines/lanes/targets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "pipeline/machines/lanes/kernels_projection.cpp"
+#include <hwy/foreach_target.h>
+
+#include "fixedpoint/lanes.h"
+#include "pipeline/machines/lanes/kernels.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+namespace {
+
+using lanes::kRays;
+
+template <bool kLargest>
+void extreme_of_rows(const lanes::RayPacket& packet, int steps, const lanes::Samples& samples,
+                     lanes::ProjectionPacket& projection) {
+    using L = Lanes<std::int32_t>;
+    for (int r = 0; r < kRays; r += static_cast<int>(L::count())) {
+        const L slabs = load<L>(packet.slabs.v + r);
+        L extreme = load<L>(projection.extreme.v + r);
+        for (int row = 0; row < steps; ++row) {
+            const L input = load<L>(samples.input.v + row * kRays + r);
+            const L next = kLargest ? max(extreme, input) : min(extreme, input);
+            extreme = select(constant<L>(samples.first + row) < slabs, next, extreme);
+        }
+        store(extreme, projection.extreme.v + r);
+    }
+}
+
+/// 16 million inputs of 31 bits, as many as a ray may have, fit 64 bits.
+void sum_of_rows(const lanes::RayPacket& packet, int steps, const lanes::Samples& samples,
+                 lanes::ProjectionPacket& projection) {
+    using L = Lanes<std::int64_t>;
+    const hn::ScalableTag<std::int64_t> d;
+    for (int r = 0; r < kRays; r += static_cast<int>(L::count())) {
+        const L slabs = load<L>(packet.slabs.v + r), zero = constant<L>(0);
+        L sum{hn::Load(d, projection.sum + r)};
+        for (int row = 0; row < steps; ++row)
+            sum = sum + select(constant<L>(samples.first + row) < slabs,
+                               load<L>(samples.input.v + row * kRays + r), zero);
+        hn::Store(sum.v, d, projection.sum + r);
+    }
+}
+
+}  // namespace
+
+void projection_kernel_of(const Plan& plan, lanes::StageKernels& kernels) {
+    const CompositingMode mode = plan.scene.compositing.mode;
+    kernels.project = mode == CompositingMode::mip     ? &extreme_of_rows<true>
+                      : mode == CompositingMode::minip ? &extreme_of_rows<false>
+                                                       : &sum_of_rows;
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace squint::lanes {
+void projection_kernel(std::int64_t target, const Plan& plan, StageKernels& kernels) {
+    SQUINT_CALL_TARGET(target, projection_kernel_of, plan, kernels)
+}
+}  // namespace squint::lanes
+#endif

@@ -1,0 +1,199 @@
+// Stages 1 and 2 in lanes.
+#include "pipeline/machines/lanes/targets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "pipeline/machines/lanes/kernels_sampling.cpp"
+#include <hwy/foreach_target.h>
+
+#include "fixedpoint/float_lanes.h"
+#include "fixedpoint/lane_tables.h"
+#include "pipeline/classification/entries.h"
+#include "pipeline/machines/lanes/kernels.h"
+#include "pipeline/stages/interpolation.h"
+#include "pipeline/stages/location.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+namespace {
+
+using lanes::kRays;
+
+/// cell_position of locations before the last voxel centre.
+template <class L>
+HWY_INLINE CellPosition<L> cell_position_inside(const LocationStage& s, const std::array<L, 3>& location) {
+    CellPosition<L> position;
+    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+        position.cell[a] = floor_shift(location[a], s.location_fraction);
+        position.weight[a] = quantise(fraction_bits(location[a], s.location_fraction), s.to_weight);
+    });
+    return position;
+}
+
+template <class L, bool kKeepsLocation>
+void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int to, lanes::Samples& out) {
+    const LocationStage stage = plan.location;  // a copy: nothing stored can change it
+    const L full = constant<L>(std::int64_t{1} << stage.length_fraction);
+    for (int r = 0; r < kRays; r += static_cast<int>(L::count())) {
+        RayWords<L> ray;
+        // P0 + kV by adding V: exact, so the same, but for floats.
+        std::array<L, 3> exact, strides, location;
+        ray.last_index = load_whole<L>(packet.last_index.v + r);
+        const L start = constant<L>(out.first + from);
+        for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+            ray.first[a] = load<L>(packet.first[a].v + r);
+            ray.last[a] = load<L>(packet.last[a].v + r);
+            ray.step[a] = load<L>(packet.step[a].v + r);
+            exact[a] = exact_location(stage, ray, start, static_cast<int>(a));
+            strides[a] = stride(stage, ray, static_cast<int>(a));
+        });
+        const L last_length = load<L>(packet.last_length.v + r);
+        const L slabs = load_whole<L>(packet.slabs.v + r), last_slab = slabs - constant<L>(1);
+        if constexpr (!RealWord<L>) {
+            // A batch that ends before any ray's last slab, its two ends inside the box: nothing is clamped.
+            const L rows = constant<L>(to - from - 1);
+            auto leaves = (constant<L>(0) < slabs) & !(constant<L>(out.first + to - 1) < last_slab);
+            for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+                const L begin = quantise(exact[a], stage.to_location),
+                        end = quantise(exact[a] + rows * strides[a], stage.to_location);
+                leaves = leaves | (min(begin, end) < constant<L>(0)) |
+                         !(max(begin, end) < constant<L>(stage.limit[a]));
+            });
+            if (!any(leaves)) {
+                for (int at = from * kRays + r; at < to * kRays; at += kRays) {
+                    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+                        location[a] = quantise(exact[a], stage.to_location);
+                        exact[a] = exact[a] + strides[a];
+                    });
+                    const CellPosition<L> position = cell_position_inside(stage, location);
+                    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+                        store_whole(position.cell[a], out.cell[a].v + at);
+                        store(position.weight[a], out.weight[a].v + at);
+                        if constexpr (kKeepsLocation) store(location[a], out.location[a].v + at);
+                    });
+                    store(full, out.length.v + at);
+                }
+                continue;
+            }
+        }
+        for (int row = from; row < to; ++row) {
+            const int at = row * kRays + r;
+            const L k = constant<L>(out.first + row);
+            for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+                if constexpr (RealWord<L>) exact[a] = exact_location(stage, ray, k, static_cast<int>(a));
+                location[a] = rounded_location(stage, ray, exact[a], k, static_cast<int>(a));
+                if constexpr (!RealWord<L>) exact[a] = exact[a] + strides[a];
+            });
+            const CellPosition<L> position = cell_position(stage, location);
+            for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+                store_whole(position.cell[a], out.cell[a].v + at);
+                store(position.weight[a], out.weight[a].v + at);
+                if constexpr (kKeepsLocation) store(location[a], out.location[a].v + at);
+            });
+            store(select(k == last_slab, last_length, full), out.length.v + at);
+        }
+    }
+}
+
+template <class L>
+void step_rows_aside(const Plan& plan, const lanes::LitSamples& lit, int end, int axis, bool ahead, int rows,
+                     lanes::Samples& out) {
+    const LocationStage stage = plan.location;
+    for (int at = 0; at < rows * kRays; at += static_cast<int>(L::count())) {
+        std::array<L, 3> location;
+        for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+            // Behind the last sample stands anything.
+            location[a] =
+                clamp(load<L>(lit.location[end][a].v + at), constant<L>(0), constant<L>(stage.limit[a]));
+        });
+        L& moved = location[static_cast<std::size_t>(axis)];
+        moved = beside(stage, moved, axis, ahead);
+        const CellPosition<L> position = cell_position(stage, location);
+        for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+            store_whole(position.cell[a], out.cell[a].v + at);
+            store(position.weight[a], out.weight[a].v + at);
+        });
+    }
+}
+
+/// A cell as it is fetched: two corners a word.
+template <class L, bool kBelow15Bits>
+struct PackedCell {
+    std::array<L, 4> pair;
+    L at(int i) const { return half_of(pair[static_cast<std::size_t>(i / 2)], i % 2 != 0); }
+    L along_x(int i, L weight, int weight_bits, const Rescale& to) const {
+        if constexpr (std::is_same_v<typename L::Element, std::int32_t>)
+            if (weight_bits <= 14)
+                return blend_pairs<L::kKnown>(signed_pairs<kBelow15Bits>(pair[static_cast<std::size_t>(i)].v),
+                                              pair_weights(weight.v, weight_bits),
+                                              kBelow15Bits ? 0 : 1 << (weight_bits + 15), to);
+        return quantise(blend(at(2 * i), at(2 * i + 1), weight, weight_bits), to);
+    }
+};
+
+/// Stage 2 of fetched corners.
+template <class L, bool kBelow15Bits>
+HWY_INLINE L stored_sample(const InterpolationStage& stage, const lanes::Samples& samples, int at) {
+    PackedCell<L, kBelow15Bits> cell;
+    cell.pair = {load<L>(samples.pair[0].v + at), load<L>(samples.pair[1].v + at),
+                 load<L>(samples.pair[2].v + at), load<L>(samples.pair[3].v + at)};
+    const std::array<L, 3> weight{load<L>(samples.weight[0].v + at), load<L>(samples.weight[1].v + at),
+                                  load<L>(samples.weight[2].v + at)};
+    return interpolate(stage, cell, weight);
+}
+
+template <class L, bool kBelow15Bits>
+void interpolate_scalar_rows(const Plan& plan, int from, int to, lanes::Samples& samples) {
+    const InterpolationStage stage = plan.interpolation;
+    for (int at = from * kRays; at < to * kRays; at += static_cast<int>(L::count()))
+        store(stored_sample<L, kBelow15Bits>(stage, samples, at), samples.input.v + at);
+}
+
+/// I: the lanes of the way from a sample to table entries, no narrower than L.
+template <class L, class I, bool kBelow15Bits>
+void interpolate_rows(const Plan& plan, int from, int to, lanes::Samples& samples) {
+    const InterpolationStage stage = plan.interpolation;
+    const InputStage input = plan.input;
+    for (int at = from * kRays; at < to * kRays; at += static_cast<int>(L::count())) {
+        const L sample = stored_sample<L, kBelow15Bits>(stage, samples, at);
+        if constexpr (std::is_same_v<typename L::Element, typename I::Element>)
+            store(classification_input(input, I{sample.v}), samples.input.v + at);
+        else
+            store(sample, samples.input.v + at);
+    }
+    if constexpr (!std::is_same_v<typename L::Element, typename I::Element>)
+        for (int at = from * kRays; at < to * kRays; at += static_cast<int>(I::count()))
+            store(classification_input(input, load<I>(samples.input.v + at)), samples.input.v + at);
+}
+
+}  // namespace
+
+void sampling_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::StageKernels& kernels) {
+    lanes::with_word<Lanes, KnownRescales::halves_up>(ways.location, [&]<class L>() {
+        kernels.locate = plan.gradient_from_samples() ? &locate_rows<L, true> : &locate_rows<L, false>;
+        kernels.step_aside = &step_rows_aside<L>;
+    });
+    lanes::with_word<Lanes, KnownRescales::halves_up>(ways.interpolation, [&]<class L>() {
+        constexpr bool kNarrow = std::is_same_v<typename L::Element, std::int32_t>;
+        const bool below_15_bits = plan.volume->largest < 1 << 15;
+        kernels.interpolate_scalars = kNarrow && below_15_bits ? &interpolate_scalar_rows<L, kNarrow>
+                                                               : &interpolate_scalar_rows<L, false>;
+        if constexpr (!kNarrow)
+            kernels.interpolate = &interpolate_rows<L, L, false>;
+        else
+            lanes::with_integer_word<Lanes, KnownRescales::halves_up>(ways.input, [&]<class I>() {
+                kernels.interpolate =
+                    below_15_bits ? &interpolate_rows<L, I, true> : &interpolate_rows<L, I, false>;
+            });
+    });
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace squint::lanes {
+void sampling_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels) {
+    SQUINT_CALL_TARGET(target, sampling_kernels_of, plan, ways, kernels)
+}
+}  // namespace squint::lanes
+#endif

@@ -1,0 +1,448 @@
+// Between stages 1 and 2: where samples' voxels lie, and their way into registers.  And what of a ray need
+// not be sampled at all.
+#include "pipeline/machines/lanes/targets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "pipeline/machines/lanes/kernels_voxels.cpp"
+#include <hwy/foreach_target.h>
+
+#include "fixedpoint/lane_tables.h"
+#include "pipeline/machines/lanes/kernels.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <limits>
+
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+namespace {
+
+using lanes::kRays;
+using lanes::kSide;
+using lanes::Samples;
+using lanes::VoxelSource;
+using lanes::Word;
+constexpr int kLanes = static_cast<int>(HWY_LANES(Word));
+
+// Offsets in voxels from a cell's lower corner to its four pairs along x.
+struct PairOffsets {
+    std::int64_t pair[4];
+    explicit PairOffsets(const Volume& volume) {
+        const std::int64_t y = volume.dims.y > 1 ? volume.dims.x : 0,
+                           z = volume.dims.z > 1 ? volume.dims.x * volume.dims.y : 0;
+        pair[0] = 0, pair[1] = y, pair[2] = z, pair[3] = y + z;
+    }
+};
+
+// A pair of voxels as two 16-bit words.
+HWY_INLINE Word pair_at(const std::uint16_t* voxels) {
+    Word both;
+    std::memcpy(&both, voxels, 4);
+    return both;
+}
+HWY_INLINE Word pair_at(const std::uint8_t* voxels) {
+    std::uint16_t both;
+    std::memcpy(&both, voxels, 2);
+    return (both & 0xff) | (both >> 8) << 16;
+}
+
+// ------------------------------------------------------------------------------- the volume itself
+
+template <class T>
+HWY_INLINE const T* corner_of(const Volume& volume, const Samples& s, int i) {
+    return static_cast<const T*>(volume.data.get()) + s.cell[0].v[i] +
+           volume.dims.x * (s.cell[1].v[i] + volume.dims.y * s.cell[2].v[i]);
+}
+
+// A packet's outermost rays stand for those between them.
+constexpr int kOutermost[] = {0, kSide - 1, kRays - kSide, kRays - 1};
+
+/// kNumbered: the number of any voxel fits a word; the cells' lowest corners are numbered in `place`.
+template <class T, bool kNumbered>
+void prefetch_linear(const VoxelSource& source, int from, int to, Samples& s) {
+    const Volume& volume = *source.volume;
+    const PairOffsets offsets(volume);
+    const hn::ScalableTag<Word> d;
+    if constexpr (kNumbered) {
+        const auto row = hn::Set(d, static_cast<Word>(volume.dims.x)),
+                   slice = hn::Set(d, static_cast<Word>(volume.dims.x * volume.dims.y));
+        for (int at = from * kRays; at < to * kRays; at += kLanes) {
+            const auto y = hn::Mul(hn::Load(d, s.cell[1].v + at), row),
+                       z = hn::Mul(hn::Load(d, s.cell[2].v + at), slice);
+            hn::Store(hn::Add(hn::Load(d, s.cell[0].v + at), hn::Add(y, z)), d, s.place.v + at);
+        }
+    }
+    // Every second step will do, for neighbours share cache lines.
+    for (int i = from * kRays; i < to * kRays; i += 2 * kRays)
+        for (const int ray : kOutermost) {
+            const T* corner = corner_of<T>(volume, s, i + ray);
+            for (const std::int64_t offset : offsets.pair) __builtin_prefetch(corner + offset);
+        }
+}
+template <class T, bool kNumbered>
+void fetch_linear(const VoxelSource& source, int from, int to, Samples& s) {
+    const Volume& volume = *source.volume;
+    const PairOffsets offsets(volume);
+    const T* const voxels = static_cast<const T*>(volume.data.get());
+    for (int i = from * kRays; i < to * kRays; ++i) {
+        const T* corner = kNumbered ? voxels + s.place.v[i] : corner_of<T>(volume, s, i);
+        for (int p = 0; p < 4; ++p) s.pair[p].v[i] = pair_at(corner + offsets.pair[p]);
+    }
+}
+
+// ------------------------------------------------------------------------------------------- cells
+
+template <class T>
+void prefetch_cells(const VoxelSource& source, int from, int to, Samples& s) {
+    const hn::ScalableTag<Word> d;
+    constexpr int kBits = lanes::CellBlocks::kBits;
+    const auto in_block = hn::Set(d, (1 << kBits) - 1), row = hn::Set(d, static_cast<Word>(source.blocks.x)),
+               slice = hn::Set(d, static_cast<Word>(source.blocks.x * source.blocks.y));
+    for (int at = from * kRays; at < to * kRays; at += kLanes) {
+        const auto x = hn::Load(d, s.cell[0].v + at), y = hn::Load(d, s.cell[1].v + at),
+                   z = hn::Load(d, s.cell[2].v + at);
+        const auto block = hn::Add(
+            hn::ShiftRight<kBits>(x),
+            hn::Add(hn::Mul(row, hn::ShiftRight<kBits>(y)), hn::Mul(slice, hn::ShiftRight<kBits>(z))));
+        const auto inside = [&](auto p) { return hn::And(p, in_block); };
+        const auto offset =
+            hn::Or(inside(x), hn::Or(hn::ShiftLeft<kBits>(inside(y)), hn::ShiftLeft<2 * kBits>(inside(z))));
+        const auto slot = hn::GatherIndex(d, source.slots.data(), block);
+        hn::Store(hn::Or(slot, offset), d, s.place.v + at);  // -1 stays -1
+    }
+    // As numbers: a cell that is not there has an address before all others, which a request may name.
+    const auto cells = reinterpret_cast<std::intptr_t>(source.cells);
+    for (int i = from * kRays; i < to * kRays; i += kRays)
+        for (const int ray : kOutermost)
+            __builtin_prefetch(reinterpret_cast<const void*>(
+                cells + std::intptr_t{s.place.v[i + ray]} * static_cast<std::intptr_t>(8 * sizeof(T))));
+}
+template <class T>
+void fetch_cells(const VoxelSource& source, int from, int to, Samples& s) {
+    const hn::ScalableTag<Word> d;
+    const PairOffsets offsets(*source.volume);
+    T spare[kLanes][8];
+    const auto spared = [&](int lane, int at) {  // a cell that is not there is put together here
+        const T* corner = corner_of<T>(*source.volume, s, at + lane);
+        for (int p = 0; p < 4; ++p)
+            spare[lane][2 * p] = corner[offsets.pair[p]],
+                            spare[lane][2 * p + 1] = corner[offsets.pair[p] + 1];
+        return reinterpret_cast<const std::uint8_t*>(spare[lane]);
+    };
+    const auto load = [](auto&& address) {
+        if constexpr (sizeof(T) == 1)
+            return load_widened_quads(address);
+        else
+            return load_quads(address);
+    };
+    for (int at = from * kRays; at < to * kRays; at += kLanes) {
+        const Word* place = s.place.v + at;
+        const auto there = [&](int lane) {
+            return source.cells + std::int64_t{place[lane]} * static_cast<std::int64_t>(8 * sizeof(T));
+        };
+        const bool all_there = hn::AllFalse(d, hn::Lt(hn::Load(d, place), hn::Zero(d)));
+        const auto pairs =
+            all_there ? load(there)
+                      : load([&](int lane) { return place[lane] < 0 ? spared(lane, at) : there(lane); });
+        for (std::size_t p = 0; p < 4; ++p) store(Lanes<Word>{pairs[p]}, s.pair[p].v + at);
+    }
+}
+
+// ------------------------------------------------------------------------------- samples to be lit
+
+int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, int steps, const Samples& s,
+                       lanes::LitSamples& lit) {
+    const hn::ScalableTag<Word> d;
+    const auto zero = hn::Zero(d);
+    const bool per_ray = plan.shading.half_per_ray || plan.shading.model == ShadingModel::phong;
+    const bool from_samples = plan.gradient_from_samples();
+    int count = 0;
+    for (int at = 0; at < steps * kRays; at += kLanes) {
+        const int r = at % kRays;
+        const auto within = hn::Gt(hn::Load(d, rays.slabs.v + r), hn::Set(d, s.first + at / kRays));
+        const auto wanted = hn::And(hn::Gt(hn::Load(d, s.alpha.v + at), zero), within);
+        const auto many = hn::CountTrue(d, wanted);
+        if (many == 0) continue;
+        // Whole vectors are stored; what lies behind the last sample is written over by the next.
+        const auto pack = [&](const Word* from, lanes::Batch& to) {
+            hn::StoreU(hn::Compress(hn::Load(d, from), wanted), d, to.v + count);
+        };
+        hn::StoreU(hn::Compress(hn::Iota(d, at), wanted), d, lit.from.v + count);
+        for (int end = 0; end < (plan.needs_back ? 2 : 1); ++end)
+            for (int a = 0; a < 3; ++a) {
+                if (from_samples) {
+                    pack(s.location[a].v + at + end * kRays, lit.location[end][a]);
+                    continue;
+                }
+                pack(s.cell[a].v + at + end * kRays, lit.cell[end][a]);
+                pack(s.weight[a].v + at + end * kRays, lit.weight[end][a]);
+            }
+        for (int c = 0; c < 3; ++c) pack(s.color[c].v + at, lit.color[c]);
+        pack(s.alpha.v + at, lit.alpha);
+        for (int a = 0; per_ray && a < 3; ++a) {
+            pack(rays.view[a].v + r, lit.view[a]);
+            for (int l = 0; l < plan.shading.lights; ++l) pack(rays.half[l][a].v + r, lit.half[l][a]);
+        }
+        count += static_cast<int>(many);
+    }
+    return count;
+}
+
+// Rows of four voxels a gradient wants, of the 4x4 about a cell: bit z * 4 + y.
+constexpr unsigned rows_of(GradientRule rule) {
+    return rule == GradientRule::analytic ? 0x0660U : rule == GradientRule::central ? 0x6ff6U : 0xffffU;
+}
+
+using Words = hn::Vec<hn::ScalableTag<Word>>;
+
+/// Four voxels along x at each lane's element of a row, as two words of pairs, or the middle two of them: by
+/// gathers.
+#if HWY_TARGET != HWY_SCALAR
+constexpr bool kGathersRows = true;
+HWY_INLINE Words spread_bytes(Words two) {
+    const hn::ScalableTag<Word> d;
+    return hn::And(hn::Or(two, hn::ShiftLeft<8>(two)), hn::Set(d, 0x00ff00ff));
+}
+HWY_INLINE std::array<Words, 2> gathered_row(const std::uint8_t* row, Words first) {
+    const hn::ScalableTag<Word> d;
+    const hn::RebindToUnsigned<decltype(d)> du;
+    const auto four = hn::GatherOffset(d, reinterpret_cast<const Word*>(row), first);
+    const auto upper = hn::BitCast(d, hn::ShiftRight<16>(hn::BitCast(du, four)));
+    return {spread_bytes(hn::And(four, hn::Set(d, 0xffff))), spread_bytes(upper)};
+}
+HWY_INLINE Words gathered_inner_pair(const std::uint8_t* row, Words first) {
+    const hn::ScalableTag<Word> d;
+    const auto four = hn::GatherOffset(d, reinterpret_cast<const Word*>(row), first);
+    return hn::Or(hn::And(hn::ShiftRight<8>(four), hn::Set(d, 0xff)), hn::And(four, hn::Set(d, 0xff0000)));
+}
+HWY_INLINE std::array<Words, 2> gathered_row(const std::uint16_t* row, Words first) {
+    const hn::ScalableTag<Word> d;
+    const hn::ScalableTag<std::int64_t> d64;
+    const hn::Half<decltype(d)> half;
+    const auto fours = [&](auto part) HWY_ATTR {
+        const auto offset = hn::ShiftLeft<1>(hn::PromoteTo(d64, part));
+        return hn::BitCast(d, hn::GatherOffset(d64, reinterpret_cast<const std::int64_t*>(row), offset));
+    };
+    const auto low = fours(hn::LowerHalf(half, first)), high = fours(hn::UpperHalf(half, first));
+    return {hn::ConcatEven(d, high, low), hn::ConcatOdd(d, high, low)};
+}
+HWY_INLINE Words gathered_inner_pair(const std::uint16_t* row, Words first) {
+    return hn::GatherOffset(hn::ScalableTag<Word>(), reinterpret_cast<const Word*>(row + 1),
+                            hn::ShiftLeft<1>(first));
+}
+#else
+constexpr bool kGathersRows = false;
+template <class T>
+std::array<Words, 2> gathered_row(const T*, Words) {
+    return {};
+}
+template <class T>
+Words gathered_inner_pair(const T*, Words) {
+    return {};
+}
+#endif
+
+template <class T>
+void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
+    const Volume& volume = *plan.volume;
+    const hn::ScalableTag<Word> d;
+    const Index3 n = volume.dims;
+    const T* data = static_cast<const T*>(volume.data.get());
+    const unsigned rows = rows_of(plan.gradient.rule);
+    const bool offsets_fit =
+        volume.voxels() < std::numeric_limits<Word>::max() / static_cast<std::int64_t>(sizeof(T));
+    const auto wants_inner = [cross = plan.gradient.rule == GradientRule::central](int row) {
+        return cross && lanes::is_outer_row(row % 4, row / 4);
+    };
+    const auto clamped = [](std::int64_t i, std::int64_t end) {
+        return std::clamp<std::int64_t>(i, 0, end - 1);
+    };
+    for (int end = 0; end < (plan.needs_back ? 2 : 1); ++end)
+        for (int at = 0; at < count; at += kLanes) {
+            lanes::Batch* pair = lit.pair[end];
+            const auto& cell = lit.cell[end];
+            auto outside = hn::Lt(hn::Load(d, cell[0].v + at), hn::Set(d, 1));
+            for (int a = 0; a < 3; ++a) {
+                const auto p = hn::Load(d, cell[a].v + at);
+                outside = hn::Or(outside, hn::Or(hn::Lt(p, hn::Set(d, 1)),
+                                                 hn::Gt(p, hn::Set(d, static_cast<Word>(n[a] - 3)))));
+            }
+            const int here = std::min(kLanes, count - at);  // lanes behind the last sample repeat the first
+            outside = hn::And(outside, hn::FirstN(d, static_cast<std::size_t>(here)));
+            if (hn::AllFalse(d, outside)) {
+                if (kGathersRows && offsets_fit) {
+                    auto first = hn::Sub(hn::Load(d, cell[2].v + at), hn::Set(d, 1));
+                    for (const int a : {1, 0})
+                        first = hn::Add(hn::Mul(first, hn::Set(d, static_cast<Word>(n[a]))),
+                                        hn::Sub(hn::Load(d, cell[a].v + at), hn::Set(d, 1)));
+                    // Lanes behind the last sample look at the first voxel.
+                    first = hn::IfThenElseZero(hn::FirstN(d, static_cast<std::size_t>(here)), first);
+                    for (int row = 0; row < 16; ++row) {
+                        if (!(rows >> row & 1)) continue;
+                        const T* line = data + n.x * (row % 4 + n.y * (row / 4));
+                        if (wants_inner(row)) {
+                            hn::Store(gathered_inner_pair(line, first), d, pair[2 * row].v + at);
+                            continue;
+                        }
+                        const std::array<Words, 2> two = gathered_row(line, first);
+                        hn::Store(two[0], d, pair[2 * row].v + at);
+                        hn::Store(two[1], d, pair[2 * row + 1].v + at);
+                    }
+                    continue;
+                }
+                const T* low[kLanes];
+                for (int lane = 0; lane < kLanes; ++lane) {
+                    const int i = lane < here ? at + lane : at;
+                    low[lane] = data + (cell[0].v[i] - 1) +
+                                n.x * ((cell[1].v[i] - 1) + n.y * std::int64_t{cell[2].v[i] - 1});
+                }
+                for (int row = 0; row < 16; ++row) {
+                    if (!(rows >> row & 1)) continue;
+                    const std::int64_t offset = n.x * (row % 4 + n.y * (row / 4));
+                    const auto address = [&](int lane) {
+                        return reinterpret_cast<const std::uint8_t*>(low[lane] + offset);
+                    };
+                    const auto words = [&] {
+                        if constexpr (sizeof(T) == 1)
+                            return load_widened_quads(address);
+                        else
+                            return load_quads(address);
+                    }();
+                    const bool inner = wants_inner(row);
+                    hn::Store(inner ? inner_pair(words[0], words[1]) : words[0], d, pair[2 * row].v + at);
+                    hn::Store(words[1], d, pair[2 * row + 1].v + at);
+                }
+                continue;
+            }
+            // Beside the volume's faces its outermost voxels go on.
+            for (int i = at; i < at + here; ++i)
+                for (int row = 0; row < 16; ++row) {
+                    if (!(rows >> row & 1)) continue;
+                    const T* line = data + n.x * (clamped(cell[1].v[i] + row % 4 - 1, n.y) +
+                                                  n.y * clamped(cell[2].v[i] + row / 4 - 1, n.z));
+                    const auto voxel = [&](int x) { return Word{line[clamped(cell[0].v[i] + x - 1, n.x)]}; };
+                    const bool inner = wants_inner(row);
+                    pair[2 * row].v[i] = inner ? voxel(1) | voxel(2) << 16 : voxel(0) | voxel(1) << 16;
+                    pair[2 * row + 1].v[i] = voxel(2) | voxel(3) << 16;
+                }
+        }
+}
+
+// ------------------------------------------------------------------------------------- empty space
+
+/// Bit i of the answer: whether something may be seen about some beam at row `at[i]`, i < kWindow.
+template <class At>
+std::uint32_t seen_about(const lanes::EmptySpace& empty, const lanes::RayCourse& course, int enough,
+                         At&& at) {
+    const hn::ScalableTag<float> df;
+    const hn::ScalableTag<Word> d;
+    const Index3& corners = empty.corners;
+    std::uint32_t seen = 0;
+    for (int lane = 0; lane < lanes::RayCourse::kWindow; lane += kLanes) {
+        const auto row = at(lane);
+        auto here = hn::Gt(hn::Zero(d), hn::Zero(d));
+        for (int beam = 0; beam < course.beams; ++beam) {
+            auto index = hn::Zero(d);
+            for (int a = 2; a >= 0; --a) {
+                const auto p =
+                    hn::MulAdd(row, hn::Set(df, course.step[beam][a]), hn::Set(df, course.first[beam][a]));
+                const auto inside =
+                    hn::Min(hn::Max(p, hn::Zero(df)), hn::Set(df, static_cast<float>(corners[a] - 1)));
+                index = hn::Add(hn::Mul(index, hn::Set(d, static_cast<Word>(corners[a]))),
+                                hn::NearestInt(inside));
+            }
+            const auto clear =
+                hn::And(hn::GatherOffset(d, reinterpret_cast<const Word*>(empty.clear.data()), index),
+                        hn::Set(d, 0xff));
+            here = hn::Or(here, hn::Lt(clear, hn::Set(d, enough)));
+        }
+        std::uint8_t bits[8] = {};
+        hn::StoreMaskBits(d, here, bits);
+        seen |= static_cast<std::uint32_t>(bits[0] | bits[1] << 8) << lane;
+    }
+    return seen;
+}
+
+lanes::Rows visible_rows_of(const lanes::EmptySpace& empty, const lanes::RayPacket& rays, int k,
+                            lanes::RayCourse& course) {
+    constexpr int kWindow = lanes::RayCourse::kWindow;
+    const hn::ScalableTag<float> df;
+    const auto rows_from = [&](int first, float apart, float begin) {
+        return [=](int lane) HWY_ATTR {
+            return hn::MulAdd(hn::Iota(df, static_cast<float>(lane)), hn::Set(df, apart),
+                              hn::Set(df, static_cast<float>(first) + begin));
+        };
+    };
+    while (k < rays.most_slabs) {
+        if (k + lanes::kSteps > course.window + kWindow) {
+            course.window = k;
+            course.may_be_seen = seen_about(empty, course, course.enough, rows_from(k, 1, 0));
+        }
+        const std::uint32_t ahead = course.may_be_seen >> (k - course.window);
+        const int skipped = ahead ? std::countr_zero(ahead) : 0;
+        if (ahead && k + skipped + lanes::kSteps <= course.window + kWindow) {
+            const auto batch = (ahead >> skipped) & ((1U << lanes::kSteps) - 1);
+            const int first = k + skipped;
+            return {first, std::clamp(static_cast<int>(std::bit_width(batch)), 0, rays.most_slabs - first)};
+        }
+        if (ahead) {
+            k += skipped;
+            continue;
+        }
+        // A wide gap, perhaps.
+        k = course.window + kWindow;
+        const auto n = static_cast<float>(course.stride);
+        for (std::uint32_t seen = 0; seen == 0 && k < rays.most_slabs;) {
+            seen = seen_about(empty, course, course.enough_of_stride, rows_from(k, n, 0.5F * (n - 1)));
+            k += (seen ? std::countr_zero(seen) : kWindow) * course.stride;
+        }
+    }
+    return {rays.most_slabs, 0};
+}
+
+void pass_over_rows(const lanes::RayPacket& rays, int from, int to, lanes::PixelPacket& pixels) {
+    const hn::ScalableTag<Word> d;
+    const auto zero = hn::Zero(d);
+    for (int r = 0; r < kRays; r += kLanes) {
+        const auto slabs = hn::Min(hn::Max(hn::Sub(hn::Load(d, rays.slabs.v + r), hn::Set(d, from)), zero),
+                                   hn::Set(d, to - from));
+        const auto active = hn::Gt(hn::Load(d, pixels.active.v + r), zero);
+        hn::Store(hn::Add(hn::Load(d, pixels.samples.v + r), hn::IfThenElseZero(active, slabs)), d,
+                  pixels.samples.v + r);
+    }
+}
+
+template <class T>
+void choose_voxel_kernels(const VoxelSource& source, lanes::StageKernels& kernels) {
+    if (source.cells)
+        kernels.prefetch = &prefetch_cells<T>, kernels.fetch = &fetch_cells<T>;
+    else if (source.volume->voxels() <= std::numeric_limits<Word>::max())
+        kernels.prefetch = &prefetch_linear<T, true>, kernels.fetch = &fetch_linear<T, true>;
+    else
+        kernels.prefetch = &prefetch_linear<T, false>, kernels.fetch = &fetch_linear<T, false>;
+    kernels.fetch_lit = &fetch_lit_samples<T>;
+}
+
+}  // namespace
+
+void voxel_kernels_of(const VoxelSource& source, lanes::StageKernels& kernels) {
+    kernels.visible_rows = &visible_rows_of;
+    kernels.pass_over = &pass_over_rows;
+    kernels.gather_lit = &gather_lit_samples;
+    if (source.volume->type == ScalarType::u8)
+        choose_voxel_kernels<std::uint8_t>(source, kernels);
+    else
+        choose_voxel_kernels<std::uint16_t>(source, kernels);
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace squint::lanes {
+void voxel_kernels(std::int64_t target, const VoxelSource& source, StageKernels& kernels) {
+    SQUINT_CALL_TARGET(target, voxel_kernels_of, source, kernels)
+}
+}  // namespace squint::lanes
+#endif

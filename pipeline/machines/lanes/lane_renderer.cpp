@@ -1,0 +1,289 @@
+#include "pipeline/machines/lanes/lane_renderer.h"
+
+#include "pipeline/machines/lanes/packet_loop.h"
+#include "pipeline/machines/lanes/targets.h"
+#include "pipeline/raycast.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <vector>
+
+namespace squint::lanes {
+namespace {
+
+using namespace squint::HWY_NAMESPACE;
+
+// Bits of the lanes that hold a stage; 0 where none does.
+int bits_of(const WordNeeds& needs) {
+    constexpr int kBitsOfDouble = 54;  // with a sign: what 32-bit lanes have for wide numbers
+    if (needs.operand_bits > 32) return 0;
+    if (needs.lane_bits <= 32 && needs.wide_bits <= kBitsOfDouble) return 32;
+    return std::max(needs.lane_bits, needs.wide_bits) <= 64 ? 64 : 0;
+}
+
+// The most that is known of a stage's roundings, in 32-bit lanes.
+struct KnownOf {
+    KnownRescales known = KnownRescales::halves_up;
+    void operator()(const Rescale& to) {
+        while (!holds(known, to, 32))
+            known =
+                known == KnownRescales::halves_up ? KnownRescales::halves_to_even : KnownRescales::nothing;
+    }
+    void operator()(const Table&) {}
+    void operator()(const CellTable&) {}
+};
+template <class... Stage>
+KnownRescales known_of(Stage... stage) {
+    KnownOf all;
+    const auto visit = [&](auto& r) { all(r); };
+    (stage.visit(visit), ...);
+    return all.known;
+}
+
+// How far samples may leave the box that is rendered, in voxels.
+double drift_of(const Plan& plan) {
+    const Index3& n = plan.volume->dims;
+    const double of_floats = plan.float32 ? static_cast<double>(std::max({n.x, n.y, n.z})) * 0x1p-20 : 0;
+    return of_floats + plan.location.drift();
+}
+
+// Blocks that a slab's two ends may lie apart; 0 where one sample classifies it.
+int slab_reach(const Plan& plan) {
+    if (!plan.needs_back) return 0;
+    return static_cast<int>(std::ceil(std::min((plan.scene.sampling.step + drift_of(plan)) / kBlock, 1e6)));
+}
+
+// Blocks that samples may lie in, and as many about them as a slab reaches, and one more.
+BlockBox blocks_met(const Plan& plan) {
+    const Volume& volume = *plan.volume;
+    const BlockBox all = all_blocks_of(volume);
+    const Vec3 low = volume.voxel_from_world(plan.box_low), high = volume.voxel_from_world(plan.box_high);
+    const double beyond = kBlock * (slab_reach(plan) + 1) + drift_of(plan) + 1;
+    BlockBox box;
+    for (int a = 0; a < 3; ++a) {
+        const auto block = [&](double voxel) {
+            const double inside = std::clamp(voxel, 0.0, static_cast<double>(volume.dims[a] - 1));
+            return std::min(static_cast<std::int64_t>(inside) >> kBlockBits, all.blocks[a] - 1);
+        };
+        box.low[a] = block(low[a] - beyond);
+        box.blocks[a] = std::max(block(high[a] + beyond), box.low[a]) - box.low[a] + 1;
+    }
+    return box;
+}
+
+// Whether rays may meet a block of cells.  Those that leave out empty space still run through what lies
+// within a batch of something visible.
+bool may_be_met(const BlockBox& box, const EmptySpace* empty, const Index3& cell_blocks, std::int64_t block) {
+    constexpr int kBits = CellBlocks::kBits - kBlockBits;
+    static_assert(kBits >= 0);
+    const Index3 at(block % cell_blocks.x, block / cell_blocks.x % cell_blocks.y,
+                    block / (cell_blocks.x * cell_blocks.y));
+    Index3 low, end;
+    for (int a = 0; a < 3; ++a) {
+        low[a] = std::max(at[a] << kBits, box.low[a]);
+        end[a] = std::min((at[a] + 1) << kBits, box.low[a] + box.blocks[a]);
+        if (low[a] >= end[a]) return false;
+    }
+    if (!empty) return true;
+    for (auto z = low.z; z < end.z; ++z)
+        for (auto y = low.y; y < end.y; ++y)
+            for (auto x = low.x; x < end.x; ++x)
+                if (empty->at(x, y, z) <= kSteps >> kBlockBits) return true;
+    return false;
+}
+
+// MIP: a block changes a ray where its greatest scalar or any below can be seen.  Else no sample of it is the
+// ray's largest, or the largest is as transparent as whatever stands in its place.
+BlockRanges from_zero(BlockRanges ranges) {
+    std::fill(ranges.smallest.begin(), ranges.smallest.end(), std::uint16_t{0});
+    return ranges;
+}
+
+// What the system could give: pages of mapped files make way.
+std::int64_t free_memory() {
+    std::ifstream file("/proc/meminfo");
+    for (std::string word; file >> word;)
+        if (std::int64_t kib = 0; word == "MemAvailable:" && file >> kib) return kib << 10;
+    return std::int64_t{sysconf(_SC_AVPHYS_PAGES)} * sysconf(_SC_PAGESIZE);
+}
+
+}  // namespace
+
+StageWays ways_of(const Plan& plan) {
+    const auto bits = [&](std::size_t stage) { return bits_of(plan.stages[stage].needs); };
+    StageWays ways;
+    if (plan.float32) {
+        for (StageWay* way : {&ways.location, &ways.interpolation, &ways.classification, &ways.compositing,
+                              &ways.gradient, &ways.shading, &ways.input})
+            way->is_float = true;
+        return ways;
+    }
+    KnownOf location;
+    location(plan.location.to_location), location(plan.location.to_weight);
+    ways.location = {bits(0), location.known};
+    ways.input = {bits_of(plan.input_needs), known_of(plan.input)};
+    ways.interpolation = {bits(1), known_of(plan.interpolation)};
+    ways.classification = {bits(3), std::visit([](const auto& m) { return known_of(m); }, plan.method)};
+    const KnownRescales lit = known_of(plan.gradient, plan.shading);
+    ways.gradient = {bits_of(plan.gradient_needs), lit};
+    ways.shading = {std::max(bits_of(plan.normal_needs), bits(4)), lit};
+    ways.compositing = {bits(5), known_of(plan.compositing)};
+    return ways;
+}
+
+std::optional<std::string> what_needs_the_model(const Plan& plan) {
+    if (plan.real && !plan.float32) return "nothing is rounded";
+    if (plan.float32) {  // formats do not matter
+        if (plan.projection_mode) return "mip, minip and average of floats run in the model";
+        if (plan.scene.output.depth || plan.scene.output.normals)
+            return "depth and normals of floats are written by the model";
+        if (plan.gradient_from_samples()) return "gradients from samples of floats run in the model";
+        if (std::holds_alternative<MomentSeries>(plan.method))
+            return "moments beyond the first have no float32 lanes";
+        return std::nullopt;
+    }
+    const auto too_wide = [](std::string_view name, const WordNeeds& needs) -> std::optional<std::string> {
+        if (bits_of(needs) != 0) return std::nullopt;
+        return fmt::format("{}: factors of {} bits and results of {} fit no lane (32 and 64)", name,
+                           needs.operand_bits, needs.lane_bits);
+    };
+    for (std::size_t i = 0; i < plan.stages.size(); ++i) {
+        const StageReport& stage = plan.stages[i];
+        const bool once_a_ray = plan.projection_mode && i >= 2;  // in the model's words
+        if (const auto obstacle = too_wide(stage.name, stage.needs);
+            stage.modelled && !once_a_ray && obstacle)
+            return obstacle;
+    }
+    if (const auto obstacle = too_wide("classification input", plan.input_needs)) return obstacle;
+    if (plan.lit && plan.specs[Wire::normal].overflow == Overflow::wrap)
+        return "a normal that wraps round is divided by the model";
+    std::vector<Wire> stored{
+        Wire::location,     Wire::direction,  Wire::weight,     Wire::length,    Wire::classification_input,
+        Wire::slab_ratio,   Wire::slab_color, Wire::slab_alpha, Wire::lit_color, Wire::color,
+        Wire::transparency, Wire::light};
+    if (plan.lit) stored.push_back(Wire::normal);
+    if (plan.gradient_from_samples()) stored.push_back(Wire::sample);
+    for (const Wire wire : stored) {
+        const Format& f = plan.specs[wire].format;
+        if (f.integer_bits + f.fraction_bits > 31)
+            return fmt::format("{}: {} is wider than a lane's 31 bits and sign", info(wire).name,
+                               to_string(f));
+    }
+    return std::nullopt;
+}
+
+LaneRenderer::LaneRenderer(const Plan& plan, const RenderOptions& options)
+    : plan_(plan), target_(find_target(options.target)), ways_(ways_of(plan)) {
+    room_ = options.layout_bytes >= 0 ? options.layout_bytes : free_memory() / 2;
+    if (options.skip && plan.skips_empty_space) find_empty();
+    choose_layout(options);
+    kernels_ = kernels_for(plan, ways_, voxels_, target_);
+}
+
+void LaneRenderer::find_empty() {
+    constexpr int kMostReach = 4;  // with longer slabs little is left out
+    if (slab_reach(plan_) > kMostReach) return;
+    const BlockBox box = blocks_met(plan_);
+    if (EmptySpace::bytes_for(box) > room_) {
+        no_room_to_skip_ = true;
+        return;
+    }
+    const std::shared_ptr<const BlockRanges> ranges = block_ranges(*plan_.volume, box);
+    const auto find = [&](const BlockRanges& r) {
+        return find_empty_space(r, plan_.entries, slab_reach(plan_), plan_.entry_reach);
+    };
+    empty_ = plan_.projection_mode ? find(from_zero(*ranges)) : find(*ranges);
+    room_ -= EmptySpace::bytes_for(empty_->box);
+}
+
+void LaneRenderer::choose_layout(const RenderOptions& options) {
+    const Volume& volume = *plan_.volume;
+    const std::int64_t all = CellBlocks::bytes_of_all(volume);
+    voxels_.volume = plan_.volume.get();
+    if (options.layout == LayoutRule::linear) {
+        layout_ = "linear: as asked";
+        return;
+    }
+    if (options.layout == LayoutRule::automatic) {
+        // Cells pay where a block is met by many more samples than it takes voxels to build.
+        const double samples = static_cast<double>(plan_.camera.width) * plan_.camera.height *
+                               static_cast<double>(std::max({volume.dims.x, volume.dims.y, volume.dims.z})) /
+                               plan_.scene.sampling.step;
+        if (samples < 8 * static_cast<double>(volume.voxels())) {
+            layout_ = "linear: too few samples for cells to pay";
+            return;
+        }
+    }
+    const std::int64_t room = std::max<std::int64_t>(room_ - CellBlocks::table_bytes_of(volume), 0);
+    cells_ = cell_blocks(volume, room, options.layout_bytes >= 0);
+    if (cells_->room() > 0) {
+        const BlockBox box = blocks_met(plan_);
+        cells_->build([&](std::int64_t block) {
+            return may_be_met(box, empty_ ? &*empty_ : nullptr, cells_->blocks(), block);
+        });
+        voxels_.cells = cells_->data(), voxels_.blocks = cells_->blocks(), voxels_.slots = cells_->slots();
+    }
+    layout_ = fmt::format("cells: 2x2x2 voxels side by side, {:.1f} MiB if all were met, room for {:.1f} MiB",
+                          static_cast<double>(all) / 0x1p20, static_cast<double>(cells_->room()) / 0x1p20);
+}
+
+std::string words_in_lanes(const Plan& plan) {
+    if (plan.float32) return "float32 lanes";
+    const StageWays ways = ways_of(plan);
+    if (plan.projection_mode)
+        return fmt::format("lanes of {}/{} bits (location, interpolation), one classification a ray",
+                           ways.location.bits, ways.interpolation.bits);
+    std::string text = fmt::format(
+        "lanes of {}/{}/{}/{} bits (location, interpolation, classification, compositing)",
+        ways.location.bits, ways.interpolation.bits, ways.classification.bits, ways.compositing.bits);
+    if (plan.lit) text += fmt::format(", gradients {}, shading {}", ways.gradient.bits, ways.shading.bits);
+    return text;
+}
+
+std::string LaneRenderer::why() const {
+    std::string text = words_in_lanes(plan_);
+    if (empty_)
+        text += fmt::format("; {} of {} blocks visible", empty_->visible_blocks, empty_->distance.size());
+    if (no_room_to_skip_) text += "; empty space is visited, for there is no room for its blocks";
+    return text;
+}
+
+std::int64_t LaneRenderer::bytes() const {
+    return (empty_ ? EmptySpace::bytes_for(empty_->box) : 0) + (cells_ ? cells_->bytes() : 0);
+}
+
+void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& image,
+                               TileStatistics& statistics) const {
+    const auto workspace = std::make_unique_for_overwrite<Workspace>();
+    Workspace& w = *workspace;
+    if (plan_.lit) w.lit = {};  // lanes behind the last gathered sample are computed, too
+    PacketLoop loop(plan_, kernels_, voxels_, empty_ ? &*empty_ : nullptr, w);
+    const bool colors_alone = !plan_.projection_mode && image.channels.size() == 4;
+    for (int y = top; y < bottom; y += kSide)
+        for (int x = left; x < right; x += kSide) {
+            const PacketPlace place{x, y, right, bottom};
+            kernels_.set_up(plan_, place, w.rays);
+            loop.run();
+            if (colors_alone)
+                kernels_.store_colors(plan_, w.pixels, place, image);
+            else
+                for (int r = 0; r < kRays; ++r) {
+                    if (!place.inside(r)) continue;
+                    const auto store = [&](const auto& pixel) {
+                        store_pixel(plan_, pixel, place.column(r), place.row(r), image);
+                    };
+                    plan_.float32 ? store(finished<Real<float>>(w.pixels, r)) : store(loop.pixel(r));
+                }
+            statistics.rays += w.rays.rays, statistics.visited += loop.visited();
+            statistics.samples += loop.samples();
+        }
+}
+
+}  // namespace squint::lanes

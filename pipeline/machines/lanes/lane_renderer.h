@@ -1,0 +1,55 @@
+// The fast path: packets of 16 rays through the stages' kernels, batch after batch.  Bit for bit what the
+// model gives.
+#pragma once
+
+#include "core/image.h"
+#include "pipeline/machines/lanes/empty_space.h"
+#include "pipeline/machines/lanes/kernels.h"
+#include "pipeline/machines/model.h"
+#include "pipeline/render.h"
+
+#include <memory>
+#include <optional>
+#include <string>
+
+namespace squint::lanes {
+
+/// What keeps a plan from the lanes, in one line; none when they can run it.
+std::optional<std::string> what_needs_the_model(const Plan& plan);
+
+/// The words of a plan that they can run, in one line.
+std::string words_in_lanes(const Plan& plan);
+
+class LaneRenderer {
+  public:
+    /// Throws InputError for a target this machine lacks.
+    LaneRenderer(const Plan& plan, const RenderOptions& options);
+
+    /// As ModelRenderer::render_tile.
+    void render_tile(int left, int top, int right, int bottom, Image& image,
+                     TileStatistics& statistics) const;
+
+    std::string target() const { return target_name(target_); }
+    std::string why() const;
+    std::int64_t bytes() const;
+
+    /// How the volume lies in memory, and why.
+    std::string layout() const { return layout_; }
+
+  private:
+    void find_empty();
+    void choose_layout(const RenderOptions& options);
+
+    const Plan& plan_;
+    std::int64_t target_;
+    StageWays ways_;
+    StageKernels kernels_;
+    std::optional<EmptySpace> empty_;
+    std::shared_ptr<CellBlocks> cells_;
+    bool no_room_to_skip_ = false;
+    std::int64_t room_ = 0;  // bytes for what stands beside the volume
+    VoxelSource voxels_;
+    std::string layout_;
+};
+
+}  // namespace squint::lanes

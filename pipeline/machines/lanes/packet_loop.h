@@ -1,0 +1,292 @@
+// One packet of 16 rays, batch after batch through the stages' kernels.  For lane_renderer.cpp alone.
+#pragma once
+
+#include "pipeline/machines/lanes/kernels.h"
+#include "pipeline/machines/lanes/packet.h"
+#include "pipeline/machines/model.h"
+#include "pipeline/raycast.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <iterator>
+#include <limits>
+#include <numeric>
+
+namespace squint::lanes {
+
+using namespace squint::HWY_NAMESPACE;
+
+// A word in the buffers: an integer, or a float's bits.
+inline Word bits_of(std::int64_t word) {
+    return static_cast<Word>(word);
+}
+inline Word bits_of(Real<float> word) {
+    return std::bit_cast<Word>(word.v);
+}
+inline void word_from_bits(Word bits, std::int64_t& word) {
+    word = bits;
+}
+inline void word_from_bits(Word bits, Real<float>& word) {
+    word.v = std::bit_cast<float>(bits);
+}
+
+inline bool any_active(const PixelPacket& pixels) {
+    return std::any_of(std::begin(pixels.active.v), std::end(pixels.active.v), [](Word a) { return a != 0; });
+}
+
+// What depth and normals are made of: touched only where a scene asks for them.
+struct Notes {
+    Batch between;                     // T at the ends of a batch's slabs
+    Row samples_before;                // of the batch
+    Pixel<std::int64_t> pixel[kRays];  // depths, and the first visible slab's normal
+    bool met[kRays];                   // something lit, and so visible
+};
+
+// One packet's buffers: about 60 KiB, most of it touched only where light falls.
+struct Workspace {
+    RayPacket rays;
+    RayCourse course;
+    PixelPacket pixels;
+    ProjectionPacket projection;
+    Samples samples[2];  // this batch, and the next one's locations
+    LitSamples lit;
+    Samples beside;  // those that a gradient is made of
+    Notes notes;
+};
+
+/// Ray r's pixel, with what has been noted of it.
+template <class W>
+Pixel<W> finished(const PixelPacket& pixels, int r, Pixel<W> pixel = {}) {
+    for (std::size_t c = 0; c < 3; ++c) word_from_bits(pixels.color[c].v[r], pixel.gathered.color[c]);
+    word_from_bits(pixels.transparency.v[r], pixel.gathered.transparency);
+    pixel.samples = pixels.samples.v[r];
+    return pixel;
+}
+
+class PacketLoop {
+  public:
+    PacketLoop(const Plan& plan, const StageKernels& kernels, const VoxelSource& voxels,
+               const EmptySpace* empty, Workspace& w)
+        : plan_(plan),
+          kernels_(kernels),
+          voxels_(voxels),
+          empty_(empty),
+          w_(w),
+          backwards_(plan.compositing.form == CompositingForm::back_to_front && !plan.projection_mode),
+          notes_((plan.wants_depth || plan.scene.output.normals) && !plan.projection_mode) {}
+
+    /// All slabs of a packet whose rays are set up.
+    void run() {
+        located_ = -1, visited_ = 0;
+        start_pixels();
+        if (notes_)
+            std::fill_n(w_.notes.pixel, kRays, Pixel<std::int64_t>{}),
+                std::fill_n(w_.notes.met, kRays, false);
+        if (w_.rays.most_slabs == 0) return;
+        if (empty_) kernels_.set_course(plan_, *empty_, w_.rays, w_.course);
+        if (backwards_)
+            run_backwards();
+        else
+            run_forwards();
+    }
+
+    /// Ray r's pixel.
+    Pixel<std::int64_t> pixel(int r) const {
+        if (plan_.projection_mode && w_.rays.slabs.v[r] > 0)
+            return project_pixel(plan_,
+                                 plan_.scene.compositing.mode == CompositingMode::average
+                                     ? w_.projection.sum[r]
+                                     : w_.projection.extreme.v[r],
+                                 w_.rays.slabs.v[r]);
+        return finished<std::int64_t>(w_.pixels, r, notes_ ? w_.notes.pixel[r] : Pixel<std::int64_t>{});
+    }
+
+    /// Slabs composited, or projected; a ray outside the tile has none.
+    std::int64_t samples() const {
+        const Row& counted = plan_.projection_mode ? w_.rays.slabs : w_.pixels.samples;
+        return std::accumulate(std::begin(counted.v), std::end(counted.v), std::int64_t{0});
+    }
+    /// Slabs of the packet, of all its rays, that went through the stages.
+    std::int64_t visited() const { return visited_; }
+
+  private:
+    void start_pixels() {
+        if (plan_.float32)
+            start_pixels_from(nothing_yet<Real<float>>(plan_.compositing));
+        else
+            start_pixels_from(nothing_yet<std::int64_t>(plan_.compositing));
+        for (int r = 0; plan_.projection_mode && r < kRays; ++r) {
+            // Inputs are not negative.
+            w_.projection.extreme.v[r] =
+                plan_.scene.compositing.mode == CompositingMode::minip ? std::numeric_limits<Word>::max() : 0;
+            w_.projection.sum[r] = 0;
+        }
+    }
+    template <class W>
+    void start_pixels_from(const Accumulated<W>& none) {
+        for (int r = 0; r < kRays; ++r) {
+            for (std::size_t c = 0; c < 3; ++c) w_.pixels.color[c].v[r] = bits_of(none.color[c]);
+            w_.pixels.transparency.v[r] = bits_of(none.transparency);
+            w_.pixels.active.v[r] = w_.rays.slabs.v[r] > 0;
+            w_.pixels.samples.v[r] = 0;
+        }
+    }
+
+    void run_forwards() {
+        Rows rows = next_rows(0);
+        kernels_.pass_over(w_.rays, 0, rows.first, w_.pixels);
+        bool carried = false;  // the sample behind the last slab is known: the next batch's row 0
+        while (rows.count > 0) {
+            const Rows next = next_rows(rows.end());
+            batch(rows, next, carried);
+            if (!any_active(w_.pixels)) return;
+            kernels_.pass_over(w_.rays, rows.end(), next.first, w_.pixels);
+            carried = plan_.needs_back && next.first == rows.end();
+            rows = next;
+        }
+    }
+
+    void run_backwards() {
+        for (int end = w_.rays.most_slabs; end > 0; end -= kSteps) {
+            const int k = std::max(0, end - kSteps);
+            batch({k, end - k}, {k, 0}, false);
+        }
+    }
+
+    // Slabs between a batch and the next composite nothing; they count as composited, as in the model.
+    Rows next_rows(int k) {
+        if (empty_) return kernels_.visible_rows(*empty_, w_.rays, k, w_.course);
+        return {k, std::min(kSteps, w_.rays.most_slabs - k)};
+    }
+
+    Samples& here() { return w_.samples[current_]; }
+
+    // A batch's slabs through all stages.  `next`: the batch behind it, no rows where that is not known.
+    void batch(const Rows& rows, const Rows& next, bool carried) {
+        const int back = plan_.needs_back ? 1 : 0;
+        const int from = carried ? 1 : 0, to = rows.count + back;
+        if (located_ == rows.first) {
+            current_ = 1 - current_;
+            if (carried) carry(w_.samples[1 - current_], here());
+        } else {
+            if (carried) carry(here(), here());
+            locate(here(), rows.first, from, to);
+        }
+        Samples& s = here();
+        look_ahead(next, next.first == rows.end() ? back : 0);
+        kernels_.fetch(voxels_, from, to, s);
+        kernels_.interpolate(plan_, from, to, s);
+        visited_ += rows.count * w_.rays.rays;
+        last_count_ = rows.count;
+        if (plan_.projection_mode) {
+            kernels_.project(w_.rays, rows.count, s, w_.projection);
+            return;
+        }
+        kernels_.classify(plan_, rows.count, s);
+        const int lit = plan_.lit ? light(rows.count) : 0;
+        if (notes_) w_.notes.samples_before = w_.pixels.samples;
+        kernels_.composite(plan_, w_.rays, rows.count, s, w_.pixels, w_.notes.between);
+        if (notes_) note(lit);
+    }
+
+    void locate(Samples& s, int k, int from, int to) {
+        s.first = k;
+        kernels_.locate(plan_, w_.rays, from, to, s);
+        kernels_.prefetch(voxels_, from, to, s);
+    }
+
+    // Locations of the batch to come, and its voxels on their way from memory while this batch computes.
+    void look_ahead(const Rows& next, int from) {
+        located_ = -1;
+        if (next.count == 0) return;
+        locate(w_.samples[1 - current_], next.first, from, next.count + (plan_.needs_back ? 1 : 0));
+        located_ = next.first;
+    }
+
+    // One batch's last row becomes the next one's first.
+    void carry(const Samples& from, Samples& to) const {
+        const auto move = [this](const Batch& a, Batch& b) {
+            std::memmove(b.v, a.v + last_count_ * kRays, sizeof(Word) * kRays);
+        };
+        move(from.input, to.input), move(from.length, to.length);
+        for (int a = 0; a < 3; ++a) move(from.cell[a], to.cell[a]), move(from.weight[a], to.weight[a]);
+        for (int a = 0; plan_.gradient_from_samples() && a < 3; ++a) move(from.location[a], to.location[a]);
+    }
+
+    // Gathers what is visible and not yet hidden, lights it, and puts it back.  Gives its number.
+    int light(int steps) {
+        Samples& s = here();
+        LitSamples& lit = w_.lit;
+        if (!backwards_) kernels_.hide(plan_, w_.rays, w_.pixels, steps, s);
+        const int count = kernels_.gather_lit(plan_, w_.rays, steps, s, lit);
+        if (count == 0) return 0;
+        if (plan_.gradient_from_samples())
+            sample_beside(count);
+        else
+            kernels_.fetch_lit(plan_, count, lit);
+        kernels_.find_normals(plan_, count, lit);
+        kernels_.shade(plan_, count, lit);
+        for (int i = 0; i < count; ++i)
+            for (int c = 0; c < 3; ++c) s.color[c].v[lit.from.v[i]] = lit.color[c].v[i];
+        return count;
+    }
+
+    // The six samples about each of the first `count` gathered ones, or about either of its ends.
+    void sample_beside(int count) {
+        const int rows = (count + kRays - 1) / kRays;
+        for (int end = 0; end < (plan_.needs_back ? 2 : 1); ++end)
+            for (int axis = 0; axis < 3; ++axis)
+                for (const bool ahead : {false, true}) {
+                    kernels_.step_aside(plan_, w_.lit, end, axis, ahead, rows, w_.beside);
+                    kernels_.prefetch(voxels_, 0, rows, w_.beside);
+                    kernels_.fetch(voxels_, 0, rows, w_.beside);
+                    kernels_.interpolate_scalars(plan_, 0, rows, w_.beside);
+                    std::copy_n(w_.beside.input.v, rows * kRays, w_.lit.beside[end][axis][ahead].v);
+                }
+    }
+
+    // Depths and first normals of the batch that has just been composited, `lit` samples of it lit.  A ray
+    // took its first slabs, so many as it has more `samples` than before.
+    void note(int lit) {
+        int taken[kRays];
+        for (int r = 0; r < kRays; ++r) taken[r] = w_.pixels.samples.v[r] - w_.notes.samples_before.v[r];
+        for (int r = 0; plan_.wants_depth && r < kRays; ++r) note_depths(r, taken[r]);
+        for (int i = 0; plan_.scene.output.normals && i < lit; ++i) {
+            const int place = backwards_ ? lit - 1 - i : i;  // as the ray meets them
+            const int at = w_.lit.from.v[place], r = at % kRays;
+            if (at / kRays >= taken[r] || (w_.notes.met[r] && !backwards_)) continue;
+            for (std::size_t a = 0; a < 3; ++a) w_.notes.pixel[r].first_normal[a] = w_.lit.normal[a].v[place];
+            w_.notes.met[r] = true;
+        }
+    }
+
+    void note_depths(int r, int taken) {
+        const auto transparency_at = [&](int row) {
+            Accumulated<std::int64_t> there{};
+            there.transparency = w_.notes.between.v[row * kRays + r];
+            return transparency(plan_.compositing, there);
+        };
+        for (int i = 0; i < taken; ++i) {
+            const int row = backwards_ ? taken - 1 - i : i;
+            if (here().alpha.v[row * kRays + r] <= 0) continue;
+            const std::int64_t front = transparency_at(row), back = transparency_at(row + 1);
+            note_depth(plan_, w_.rays.entry_distance[r], here().first + row, backwards_ ? back : front,
+                       backwards_ ? front : back, backwards_, w_.notes.pixel[r]);
+        }
+    }
+
+    const Plan& plan_;
+    const StageKernels& kernels_;
+    const VoxelSource& voxels_;
+    const EmptySpace* empty_;
+    Workspace& w_;
+    bool backwards_;
+    bool notes_;  // depth or normals are asked for
+    int current_ = 0;
+    int located_ = -1;    // first slab of the batch whose locations stand in the other buffer
+    int last_count_ = 0;  // slabs of the last batch
+    std::int64_t visited_ = 0;
+};
+
+}  // namespace squint::lanes

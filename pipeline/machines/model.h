@@ -1,0 +1,58 @@
+// The golden model: one ray, one sample at a time, in scalar words.  Every other path is held against it, bit
+// for bit.
+#pragma once
+
+#include "core/image.h"
+#include "pipeline/plan/plan.h"
+
+#include <array>
+#include <memory>
+#include <string>
+
+namespace squint {
+
+struct TileStatistics {
+    std::int64_t rays = 0, samples = 0, visited = 0;            // as RenderStatistics
+    std::unique_ptr<std::array<WireStatistics, kWires>> wires;  // with audit
+};
+
+template <class W>
+struct Pixel;
+
+/// A finished pixel into every channel of an image: where fixed point meets float.
+void store_pixel(const Plan& plan, const Pixel<std::int64_t>& pixel, int column, int row, Image& image);
+void store_pixel(const Plan& plan, const Pixel<Real<float>>& pixel, int column, int row, Image& image);
+
+/// MIP, MinIP, average: the pixel of a ray with `slabs` samples, one at least, from their extreme or sum.
+Pixel<std::int64_t> project_pixel(const Plan& plan, std::int64_t scalar, std::int64_t slabs);
+
+class ModelRenderer {
+  public:
+    explicit ModelRenderer(const Plan& plan, bool audit = false) : plan_(plan), audit_(audit) {}
+
+    /// Pixels [left, right) x [top, bottom) into every channel of `image`.  Safe to call from many threads on
+    /// disjoint tiles.
+    void render_tile(int left, int top, int right, int bottom, Image& image,
+                     TileStatistics& statistics) const;
+
+    /// "64-bit integers", "double, nothing rounded", ...
+    std::string why() const;
+
+  private:
+    const Plan& plan_;
+    bool audit_;
+};
+
+/// Every value on every wire along one ray, in the order it was computed.  `slab` is -1 before the first.
+struct RayTrace {
+    struct Event {
+        std::int64_t slab;
+        TraceEvent event;
+    };
+    std::vector<Event> events;
+    RaySetup setup;
+    std::array<double, 4> color;  // R G B A
+};
+RayTrace trace_ray(const Plan& plan, int column, int row);
+
+}  // namespace squint

@@ -1,0 +1,297 @@
+// A scene: everything that decides a picture.  Each setting is written once, in visit(): reading, help, the
+// record in the EXR and --set all walk that list.
+#pragma once
+
+#include "core/camera.h"
+#include "core/transfer_function.h"
+#include "core/volume_source.h"
+#include "scene/wires.h"
+
+#include <array>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace squint {
+
+enum class PositionRule { p0_kv, accumulate };
+enum class InterpolationRule { trilinear, nearest };
+enum class GradientRule { central, central_samples, analytic, sobel };
+enum class Method { pc, pc_mid, pi2d, pi2d_no_attenuation, pi1d, pi1d_engel, pips, leg };
+enum class TableLookup { bilinear, nearest };
+enum class AlphaEncoding { alpha, sqrt_alpha };  // how the table stores opacity, in the format of table_alpha
+enum class ShadingModel { none, phong, blinn_phong };
+enum class PowerRule { squaring, parabola, table };
+enum class CompositingForm { automatic, w, equation_9, alpha, back_to_front, unit255_shift, unit255_blinn };
+enum class CompositingMode { over, mip, minip, average };
+enum class LayoutRule { automatic, linear, cells };
+
+/// The names of an enumeration's values, in order.  Specialised below for each enumeration a scene can name.
+template <class E>
+struct EnumNames;
+#define SQUINT_NAMES(E, ...)                                       \
+    template <>                                                    \
+    struct EnumNames<E> {                                          \
+        static constexpr std::string_view names[] = {__VA_ARGS__}; \
+    }
+SQUINT_NAMES(Projection, "orthographic", "perspective");
+SQUINT_NAMES(PositionRule, "p0_kv", "accumulate");
+SQUINT_NAMES(InterpolationRule, "trilinear", "nearest");
+SQUINT_NAMES(GradientRule, "central", "central_samples", "analytic", "sobel");
+SQUINT_NAMES(Method, "pc", "pc_mid", "pi2d", "pi2d_no_attenuation", "pi1d", "pi1d_engel", "pips", "leg");
+SQUINT_NAMES(TableLookup, "bilinear", "nearest");
+SQUINT_NAMES(AlphaEncoding, "alpha", "sqrt_alpha");
+SQUINT_NAMES(ShadingModel, "none", "phong", "blinn_phong");
+SQUINT_NAMES(PowerRule, "squaring", "parabola", "table");
+SQUINT_NAMES(CompositingForm, "auto", "w", "equation_9", "alpha", "back_to_front", "unit255_shift",
+             "unit255_blinn");
+SQUINT_NAMES(CompositingMode, "over", "mip", "minip", "average");
+SQUINT_NAMES(LayoutRule, "auto", "linear", "cells");
+#undef SQUINT_NAMES
+
+template <class E>
+constexpr std::string_view name_of(E value) {
+    return EnumNames<E>::names[static_cast<std::size_t>(value)];
+}
+
+struct TransferFunctionSettings {
+    std::vector<std::vector<double>> points;   // [value, r, g, b, alpha]
+    std::vector<std::vector<double>> color;    // [value, r, g, b]
+    std::vector<std::vector<double>> opacity;  // [value, alpha]
+    std::string preset;                        // CT in HU, or one of the built-in scene's own
+    std::string file;                          // ParaView .json or Slicer .vp
+    std::string color_space = "linear";        // or "srgb"
+    double unit_distance = 0;                  // required with points or a ParaView file
+    int entries = 0;                           // 0: one per level, at most 4096
+};
+
+struct ImageSettings {
+    int width = 512, height = 512;
+    Vec3 background{0, 0, 0};  // of the preview only: EXR holds none
+};
+
+struct SamplingSettings {
+    double step = 1;                  // in units of the smallest voxel spacing
+    double termination = 1.0 / 1024;  // a ray ends at T below this; 0 never ends it early
+    PositionRule position = PositionRule::p0_kv;
+    InterpolationRule interpolation = InterpolationRule::trilinear;
+};
+
+struct ClipSettings {
+    std::optional<Vec3> low, high;  // a box in world units
+};
+
+struct Light {
+    bool headlight = false;
+    Vec3 direction{0, 0, 1};  // towards the light, world space; any length but zero
+    Vec3 color{1, 1, 1};
+};
+inline constexpr int kMostLights = 8;
+
+struct ShadingSettings {
+    ShadingModel model = ShadingModel::blinn_phong;  // absent where there is no light
+    GradientRule gradient = GradientRule::central;
+    double ka = 0.25, kd = 0.6, ks = 0.15;
+    double exponent = 32;
+    PowerRule power = PowerRule::squaring;
+    bool two_sided = false;
+};
+
+struct ClassificationSettings {
+    Method method = Method::pc;
+    std::optional<int> order;  // n of pips and leg
+    int table_size = 256;      // of pi2d, a side
+    TableLookup lookup = TableLookup::bilinear;
+    AlphaEncoding encoding = AlphaEncoding::alpha;
+    bool opaque_prediction = true;  // for experiments only: without it thin opaque surfaces are lost
+
+    /// The least that the method has, where none is given.
+    int order_or_least() const { return order.value_or(method == Method::leg ? 2 : 1); }
+};
+
+struct CompositingSettings {
+    CompositingMode mode = CompositingMode::over;
+    CompositingForm form = CompositingForm::automatic;  // what the precision preset composites with
+};
+
+struct OutputSettings {
+    bool depth = false;  // Z of the first hit and Z.mean, weighted by opacity; world units from the eye plane
+    bool normals = false;       // N.x N.y N.z of the first hit
+    bool samples = false;       // samples composited
+    bool transparency = false;  // T
+    bool fixed = false;         // fixed.R ... : the raw words
+};
+
+struct PrecisionSettings {
+    std::string preset = "default";  // default, squeeze, eight_bit, wide, real, float32, or a file
+    std::array<std::optional<std::string>, kWires>
+        override_;  // "u1.15 trn sat", by wire; parts may be left out
+};
+
+struct Scene {
+    VolumeSource volume;
+    TransferFunctionSettings transfer_function;
+    CameraSettings camera;
+    ImageSettings image;
+    SamplingSettings sampling;
+    ClipSettings clip;
+    std::vector<Light> lights;
+    ShadingSettings shading;
+    ClassificationSettings classification;
+    CompositingSettings compositing;
+    OutputSettings output;
+    PrecisionSettings precision;
+    std::string folder;  // paths in the scene are relative to it
+
+    // Not settings, for messages only: the file, and where each setting was given ("head.toml:7:1", "--set").
+    std::string name;
+    std::map<std::string, std::string, std::less<>> given_at;
+};
+
+/// The same settings, as written; where they came from does not count.
+bool operator==(const Scene& a, const Scene& b);
+
+/// Calls visit(key, setting, help) for every plain setting of a scene.  `lights` is a list of tables: see
+/// visit_light().
+template <class S, class V>
+void visit_scene(S& scene, V&& visit) {
+    auto& volume = scene.volume;
+    visit("volume.file", volume.file, "NRRD (attached or detached) or raw file; ${VARIABLE} expands");
+    visit("volume.procedural", volume.procedural, "built-in volume, used when no file is named");
+    visit("volume.dims", volume.dims, "voxels along x, y, z: required for raw, optional for procedural");
+    visit("volume.type", volume.type, "raw files: u8, i16, u16 or f32");
+    visit("volume.endian", volume.endian, "raw files: little or big");
+    visit("volume.offset", volume.offset, "raw files: bytes before the first voxel");
+    visit("volume.spacing", volume.spacing, "world units between voxels along x, y, z; overrides the file's");
+    visit("volume.window", volume.window, "[least, greatest] stored value kept; required for float data");
+    visit("volume.bits", volume.bits, "float and procedural data: bits the values are quantised to");
+    visit("volume.scale", volume.value_scale, "value = scale * stored + offset, in the file's units (HU)");
+    visit("volume.value_offset", volume.value_offset, "see scale");
+    auto& tf = scene.transfer_function;
+    visit("transfer_function.points", tf.points, "list of [value, r, g, b, alpha], values ascending");
+    visit("transfer_function.color", tf.color, "list of [value, r, g, b]; with opacity, instead of points");
+    visit("transfer_function.opacity", tf.opacity, "list of [value, alpha]");
+    visit("transfer_function.preset", tf.preset, "built-in function by name: ct_bone, ct_skin, ...");
+    visit("transfer_function.file", tf.file, "ParaView .json colour map or Slicer .vp");
+    visit("transfer_function.color_space", tf.color_space, "linear, or srgb: colours are decoded first");
+    visit("transfer_function.unit_distance", tf.unit_distance,
+          "world units of matter that an alpha is given for (required)");
+    visit("transfer_function.entries", tf.entries, "samples of the function; 0: one per level, at most 4096");
+    auto& camera = scene.camera;
+    visit("camera.projection", camera.projection, "orthographic or perspective");
+    visit("camera.eye", camera.eye, "world position; overrides azimuth and elevation");
+    visit("camera.center", camera.center, "world position looked at; default: the volume's middle");
+    visit("camera.up", camera.up, "up in the picture; default: z, or y where the view is along z");
+    visit("camera.azimuth", camera.azimuth, "degrees about z; 0 looks along +y");
+    visit("camera.elevation", camera.elevation, "degrees above the horizon");
+    visit("camera.height", camera.height,
+          "orthographic: world units from bottom to top; default: all of the volume");
+    visit("camera.fov_y", camera.fov_y, "perspective: vertical field of view in degrees");
+    visit("camera.turntable", camera.turntable, "pictures in a full turn");
+    visit("image.width", scene.image.width, "pixels");
+    visit("image.height", scene.image.height, "pixels");
+    visit("image.background", scene.image.background, "linear colour under the preview; EXR holds none");
+    visit("sampling.step", scene.sampling.step, "between samples, in units of the smallest voxel spacing");
+    visit("sampling.termination", scene.sampling.termination, "a ray ends when T falls below this; 0: never");
+    visit("sampling.position", scene.sampling.position, "p0_kv (exact, quantised once) or accumulate");
+    visit("sampling.interpolation", scene.sampling.interpolation, "trilinear or nearest");
+    visit("clip.low", scene.clip.low, "corner of the box kept, world units");
+    visit("clip.high", scene.clip.high, "opposite corner");
+    auto& shading = scene.shading;
+    visit("shading.model", shading.model, "none, phong or blinn_phong; absent where there is no light");
+    visit("shading.gradient", shading.gradient, "central, central_samples, analytic or sobel");
+    visit("shading.ka", shading.ka, "ambient weight");
+    visit("shading.kd", shading.kd, "diffuse weight");
+    visit("shading.ks", shading.ks, "specular weight");
+    visit("shading.exponent", shading.exponent, "specular exponent; a power of two for squaring");
+    visit("shading.power", shading.power, "squaring, parabola or table");
+    visit("shading.two_sided", shading.two_sided, "light both sides of a surface");
+    auto& classification = scene.classification;
+    visit("classification.method", classification.method,
+          "pc, pc_mid, pi2d, pi2d_no_attenuation, pi1d, pi1d_engel, pips or leg");
+    visit("classification.order", classification.order,
+          "n of pips (1 to 5; default 1) and leg (2 to 4; default 2)");
+    visit("classification.table_size", classification.table_size, "entries a side of pi2d, 64 to 4096");
+    visit("classification.lookup", classification.lookup, "pi2d: bilinear or nearest");
+    visit("classification.encoding", classification.encoding,
+          "alpha or sqrt_alpha, stored in table_alpha's format");
+    visit("classification.opaque_prediction", classification.opaque_prediction,
+          "find opaque values inside a slab");
+    visit("compositing.mode", scene.compositing.mode, "over, mip, minip or average");
+    visit("compositing.form", scene.compositing.form,
+          "w, equation_9, alpha, back_to_front, unit255_shift or unit255_blinn; auto: w, but equation_9 for "
+          "the preset "
+          "squeeze and unit255_shift for eight_bit");
+    visit("output.depth", scene.output.depth, "channels Z and Z.mean");
+    visit("output.normals", scene.output.normals, "channels N.x N.y N.z");
+    visit("output.samples", scene.output.samples, "channel samples");
+    visit("output.transparency", scene.output.transparency, "channel T");
+    visit("output.fixed", scene.output.fixed, "channels fixed.R fixed.G fixed.B fixed.T: the raw words");
+    visit("precision.preset", scene.precision.preset,
+          "default, squeeze, eight_bit, wide, real, float32 or a preset file");
+    for (int i = 0; i < kWires; ++i) {
+        const auto& wire = kWireInfo[static_cast<std::size_t>(i)];
+        visit("precision." + std::string(wire.name), scene.precision.override_[static_cast<std::size_t>(i)],
+              wire.meaning);
+    }
+}
+
+template <class L, class V>
+void visit_light(L& light, V&& visit) {
+    visit("headlight", light.headlight, "shines along the camera's axis");
+    visit("direction", light.direction, "towards the light, world space");
+    visit("color", light.color, "linear colour");
+}
+
+/// The scene that is rendered when none is named: the phantom, skin and bone and vessels, one light.
+Scene built_in_scene();
+
+/// Reads a scene file, then `key=value` overrides in order (values as in TOML; bare words are strings).
+/// Throws InputError `file:line:column: what, what was found, what is allowed`.
+Scene read_scene(const std::string& path, const std::vector<std::string>& overrides = {});
+Scene scene_with(Scene base, const std::vector<std::string>& overrides);
+/// The same from a text; `name` stands for the file in messages.
+Scene parse_scene(std::string_view text, const std::string& name, const std::string& folder,
+                  const std::vector<std::string>& overrides = {});
+
+/// Where a setting was given, to begin a message about it: "head.toml:7:8: sampling.step" or "--set
+/// sampling.step".
+std::string where(const Scene& scene, std::string_view key);
+
+/// A path as written in a setting -> the path to open: ${VARIABLE} replaced from the environment, relative to
+/// `folder`. Throws InputError beginning with `setting` where a variable is unset or empty, or ${ is not
+/// closed.
+std::string expand_path(const std::string& text, const std::string& folder, const std::string& setting);
+/// The volume's source with its path expanded, ready for load_volume().  The scene itself keeps the path as
+/// written: what is recorded names no folder of this machine.
+VolumeSource volume_source(const Scene& scene);
+
+/// The built-in precision presets.
+inline constexpr std::string_view kPrecisionPresets[] = {"default", "squeeze", "eight_bit",
+                                                         "wide",    "real",    "float32"};
+/// The precision with a preset file, if one is named, merged under the scene's own wires: `preset` is then a
+/// built-in one. A preset file is TOML with one table, [precision]: a built-in `preset` and wires.  Throws
+/// InputError.
+PrecisionSettings resolved_precision(const Scene& scene);
+
+/// The whole scene as key -> TOML value, every key present ("auto" where absent): what EXR attributes and
+/// records hold. Each pair, joined by `=`, is an override that sets the same value again.
+std::vector<std::pair<std::string, std::string>> resolved(const Scene& scene);
+/// A TOML file that reads back as the same scene.
+std::string to_toml(const Scene& scene);
+
+/// One line a setting: key, default, meaning.
+std::string scene_help();
+/// docs/scene.md: every key with its default, what is allowed and what it means.
+std::string scene_reference_markdown();
+
+/// The scene's transfer function, from points, preset or file.  Throws InputError.
+TransferFunction resolve_transfer_function(const Scene& scene);
+/// Names that `transfer_function.preset` knows: those of CT in HU, and `phantom` for the built-in volume.
+std::vector<std::string> transfer_function_presets();
+
+}  // namespace squint

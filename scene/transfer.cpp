@@ -1,0 +1,77 @@
+// [transfer_function] -> TransferFunction.
+#include "core/error.h"
+#include "core/srgb.h"
+#include "core/transfer_import.h"
+#include "scene/scene.h"
+#include "scene/toml.h"
+
+#include <fmt/format.h>
+
+namespace squint {
+namespace {
+
+constexpr std::string_view kPhantom = "phantom";
+
+Vec3 linear_color(const TransferFunctionSettings& settings, double r, double g, double b) {
+    if (settings.color_space != "srgb") return Vec3(r, g, b);
+    return Vec3(linear_from_srgb(r), linear_from_srgb(g), linear_from_srgb(b));
+}
+
+TransferFunction from_lists(const TransferFunctionSettings& settings) {
+    TransferFunction function;
+    for (const auto& p : settings.points) {
+        function.color.push_back({p[0], linear_color(settings, p[1], p[2], p[3])});
+        function.opacity.push_back({p[0], p[4]});
+    }
+    for (const auto& p : settings.color)
+        function.color.push_back({p[0], linear_color(settings, p[1], p[2], p[3])});
+    for (const auto& p : settings.opacity) function.opacity.push_back({p[0], p[1]});
+    function.unit_distance = settings.unit_distance;
+    return function;
+}
+
+TransferFunction from_preset(const Scene& scene) {
+    const std::string& name = scene.transfer_function.preset;
+    TransferFunction function;
+    if (name == kPhantom) return from_lists(built_in_scene().transfer_function);
+    if (find_transfer_preset(name, function)) return function;
+    const std::vector<std::string> known = transfer_function_presets();
+    throw InputError(fmt::format("{}: found {}; allowed: {}", where(scene, "transfer_function.preset"),
+                                 in_quotes(name), listed({known.begin(), known.end()})));
+}
+
+TransferFunction from_file(const Scene& scene) {
+    const auto& settings = scene.transfer_function;
+    const std::string path = expand_path(settings.file, scene.folder, where(scene, "transfer_function.file"));
+    const bool srgb = settings.color_space == "srgb";
+    return settings.file.ends_with(".vp") ? import_slicer_vp(path, srgb)
+                                          : import_paraview_json(path, srgb, settings.unit_distance);
+}
+
+}  // namespace
+
+std::vector<std::string> transfer_function_presets() {
+    std::vector<std::string> names = transfer_preset_names();
+    names.emplace_back(kPhantom);
+    return names;
+}
+
+TransferFunction resolve_transfer_function(const Scene& scene) {
+    const auto& settings = scene.transfer_function;
+    std::string_view key = "transfer_function.points";
+    TransferFunction function;
+    if (!settings.preset.empty())
+        key = "transfer_function.preset", function = from_preset(scene);
+    else if (!settings.file.empty())
+        key = "transfer_function.file", function = from_file(scene);
+    else
+        key = settings.points.empty() ? "transfer_function.color" : key, function = from_lists(settings);
+    // A preset and a .vp file bring their own unit distance; the scene's replaces it.
+    if (settings.unit_distance > 0) function.unit_distance = settings.unit_distance;
+    function.entries = settings.entries;
+    function.name = where(scene, key);
+    check(function);
+    return function;
+}
+
+}  // namespace squint

@@ -1,0 +1,70 @@
+// squint search: the cheapest formats of a scene's wires that keep its rounding error under a bound.
+//
+//   RUN/           a run of a sweep (studies/sweep/run.h) with every picture that was tried
+//   RUN/formats.toml   what was found: a preset file for precision.preset
+//   RUN/search.json    the figures (docs/sweeps.md, "squint search")
+#pragma once
+
+#include "studies/search/word_lengths.h"
+#include "studies/sweep/evaluate.h"
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace squint::search {
+
+enum class CostKind { bits, time, table_bytes };
+inline constexpr std::string_view kCostNames[] = {"bits", "time", "table-bytes"};
+enum class Figure { largest, rms };  // of the error over a picture
+inline constexpr std::string_view kFigureNames[] = {"max", "rms"};
+
+struct Settings {
+    std::vector<std::string> scenes;     // files; empty: the built-in scene
+    std::vector<std::string> overrides;  // of every scene
+    double most_error = 0;               // LSB8, against the same pipeline in double
+    CostKind cost = CostKind::bits;
+    Figure figure = Figure::largest;
+    bool srgb = false;         // colours as a display shows them
+    std::vector<Wire> wires;   // empty: all that the scenes use
+    bool integer_bits = true;  // search them too; otherwise they stay as the scenes have them
+    int views = 2;             // of a full turn of each scene's camera
+    int repeats = 5;           // of a timed picture
+    Options descent{.restarts = 4, .seed = 1};
+    std::string folder;   // RUN
+    std::string command;  // for the record
+    int threads = 0;      // 0: one a processor
+    const std::atomic<bool>* cancelled = nullptr;
+    std::function<void(const std::string&)> progress;  // a line, now and then
+    std::function<void(const std::string&)> note;      // what a user should know
+};
+
+/// Formats, and how they do on the views that were tuned on and on those between.
+struct Candidate {
+    std::string name;
+    std::vector<Spec> specs;            // of Result::wires
+    double bits = 0, table_bytes = 0;   // means over the scenes
+    double ms = 0;                      // with CostKind::time: mean over all pictures
+    double error = 0, other_error = 0;  // LSB8; infinite where a picture failed
+    std::string failure;
+};
+
+struct Result {
+    std::vector<Wire> wires;
+    Candidate found, scene, squeeze;
+    std::vector<Spec> alone;  // what each wire needs while all the others have the most
+    std::vector<double> degrees, other_degrees;
+    std::vector<double> costs;  // what every descent ended with
+    std::size_t trials = 0, pictures = 0,
+                computed = 0;  // vectors of formats; pictures of them; not there before
+    std::string formats_file;
+    sweep::Json json;  // squint.search/1
+};
+
+/// Throws InputError where a scene cannot be used or no formats keep the bound, and Cancelled; the pictures
+/// tried before that stay, and the same search goes on with them.
+Result run_search(const Settings& settings);
+
+}  // namespace squint::search

@@ -1,0 +1,29 @@
+#include "studies/sweep/report_page.h"
+
+#include <cstddef>
+
+// The assembler copies the file's bytes: a megabyte as an array would take the compiler a minute.
+#ifdef SQUINT_REPORT_PAGE
+asm(".section .rodata\n"
+    ".balign 16\n"
+    "squint_report_page_begin:\n"
+    ".incbin \"" SQUINT_REPORT_PAGE
+    "\"\n"
+    "squint_report_page_end:\n"
+    ".byte 0\n"
+    ".previous\n");
+extern "C" const char squint_report_page_begin[], squint_report_page_end[];
+#endif
+
+namespace squint::sweep {
+
+std::string_view report_page() {
+#ifdef SQUINT_REPORT_PAGE
+    return {squint_report_page_begin,
+            static_cast<std::size_t>(squint_report_page_end - squint_report_page_begin)};
+#else
+    return {};
+#endif
+}
+
+}  // namespace squint::sweep

@@ -1,0 +1,96 @@
+// A sweep file: a scene, axes along which it changes, and what is measured at each point.  The format is
+// described in docs/sweeps.md.
+#pragma once
+
+#include "scene/wires.h"
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace squint::sweep {
+
+/// A change of one part of a wire's Spec, whatever the rest of it is at that point.
+struct WireEdit {
+    enum class Part { fraction_bits, fraction_offset, integer_bits, integer_offset, rounding, overflow };
+    Wire wire{};
+    Part part{};
+    int number = 0;    // of bits
+    std::string text;  // of a rounding or overflow rule
+    bool operator==(const WireEdit&) const = default;
+};
+
+/// One value of an axis.
+struct Choice {
+    std::string label;                   // as TOML: a number, or a string in quotes
+    std::vector<std::string> overrides;  // key=value
+    std::vector<WireEdit> edits;
+};
+
+struct Axis {
+    std::string name;
+    std::vector<Choice> choices;
+    bool cross = false;  // in mode one_at_a_time: combined with every point all the same
+    std::string at;      // "sweep.toml:7:1", to begin a message with
+};
+
+/// [wires]: an axis for every wire, in the order of the word-length literature: fraction bits of each wire,
+/// integer bits of each, rounding of each, then all together.
+struct WireAxes {
+    bool present = false;
+    std::vector<Wire> wires;  // empty: those that the scene uses
+    std::vector<int> fraction_bits, fraction_offset, integer_bits, integer_offset;
+    std::vector<std::string> rounding;
+    bool together = true;
+};
+
+enum class Mode { product, one_at_a_time, random };
+
+/// What is measured at a point.
+struct Measure {
+    bool real = true;        // against the same pipeline in double: rounding alone
+    bool reference = false;  // against the exact integral: everything
+    bool srgb = false;       // colour differences as a display shows them, too
+    bool ssim = true;
+    bool audit = false;         // ranges, saturation, wrap and stuck T: an audited render more
+    bool conservation = false;  // |C + T - 1| with every colour white and no light: a render more
+    int repeats = 0;            // timed renders of a point, alone; 0: not timed
+    int threads = 0;            // of a timed render; 0: one a processor
+    bool exr = false;           // keep every picture in full
+    int picture_size = 128;     // pixels a side of the pictures kept for the report; 0: none
+};
+
+/// A picture that every point is compared with: the point's own scene and these settings.
+struct Baseline {
+    std::string name;
+    std::vector<std::string> overrides;
+};
+
+struct SweepFile {
+    std::string name, folder, text;  // path as given, its folder, what it holds
+    std::string title, note;
+    std::vector<std::string> scenes;     // paths as written; empty: the built-in scene
+    std::vector<std::string> overrides;  // [base], then the command line's
+    std::vector<Axis> axes;
+    WireAxes wires;
+    Mode mode = Mode::product;
+    std::int64_t samples = 0;  // of mode random
+    std::uint64_t seed = 1;
+    Measure measure;
+    std::vector<Baseline> baselines;
+};
+
+/// Throws InputError `file:line:column: what, what was found, what is allowed`.
+SweepFile read_sweep(const std::string& path, const std::vector<std::string>& overrides = {});
+SweepFile parse_sweep(std::string_view text, const std::string& name, const std::string& folder,
+                      const std::vector<std::string>& overrides = {});
+
+/// The path of scene `i`, relative to where the sweep file is; empty for the built-in scene.
+std::string scene_path(const SweepFile& sweep, std::size_t i);
+
+/// The wire of that name, or none.
+bool find_wire(std::string_view name, Wire& wire);
+
+}  // namespace squint::sweep

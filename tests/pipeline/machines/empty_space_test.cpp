@@ -1,0 +1,91 @@
+// Empty space: distances against their definition.
+#include "pipeline/machines/lanes/empty_space.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <random>
+
+namespace squint::lanes {
+namespace {
+
+// Blocks of which a few are visible, at random.
+struct Drawn {
+    EmptySpace space;
+    std::vector<Index3> visible;
+};
+Drawn draw(std::mt19937& random) {
+    const auto between = [&](int low, int high) { return std::uniform_int_distribution(low, high)(random); };
+    BlockRanges ranges;
+    ranges.box = {Index3(between(0, 3), 0, between(0, 9)),
+                  Index3(between(1, 9), between(1, 9), between(1, 9))};
+    const Index3 &n = ranges.box.blocks, &low = ranges.box.low;
+    const auto count = static_cast<std::size_t>(ranges.box.count());
+    ranges.smallest.assign(count, 0), ranges.largest.assign(count, 0);
+    Drawn drawn;
+    for (int i = between(0, 4); i > 0; --i) {
+        const Index3 at(between(0, static_cast<int>(n.x) - 1), between(0, static_cast<int>(n.y) - 1),
+                        between(0, static_cast<int>(n.z) - 1));
+        ranges.largest[static_cast<std::size_t>((at.z * n.y + at.y) * n.x + at.x)] = 200;
+        drawn.visible.push_back(at + low);
+    }
+    Entries entries;  // nothing is seen below 100
+    entries.entry.resize(256);
+    for (std::size_t i = 100; i < 256; ++i) entries.entry[i].extinction = 1;
+    drawn.space = find_empty_space(ranges, entries, 0);
+    return drawn;
+}
+std::int64_t apart(const Index3& a, const Index3& b) {
+    return std::max({std::abs(a.x - b.x), std::abs(a.y - b.y), std::abs(a.z - b.z)});
+}
+
+TEST(EmptySpace, ABlocksDistanceIsThatOfTheNearestVisibleOne) {
+    std::mt19937 random(1);
+    for (int round = 0; round < 200; ++round) {
+        const Drawn drawn = draw(random);
+        const Index3 low = drawn.space.box.low, end = low + drawn.space.box.blocks;
+        for (auto z = low.z; z < end.z; ++z)
+            for (auto y = low.y; y < end.y; ++y)
+                for (auto x = low.x; x < end.x; ++x) {
+                    std::int64_t nearest = 200;
+                    for (const Index3& v : drawn.visible) nearest = std::min(nearest, apart(v, {x, y, z}));
+                    if (nearest == 200)
+                        ASSERT_GE(drawn.space.at(x, y, z), 200);
+                    else
+                        ASSERT_EQ(drawn.space.at(x, y, z), nearest);
+                }
+    }
+}
+
+TEST(EmptySpace, ACornerIsClearOfBlocksUpToTheNearestVisibleOne) {
+    std::mt19937 random(2);
+    for (int round = 0; round < 200; ++round) {
+        const Drawn drawn = draw(random);
+        const Index3 low = drawn.space.box.low, n = drawn.space.corners;
+        ASSERT_EQ(n, drawn.space.box.blocks + Index3(1));
+        for (std::int64_t z = 0; z < n.z; ++z)
+            for (std::int64_t y = 0; y < n.y; ++y)
+                for (std::int64_t x = 0; x < n.x; ++x) {
+                    // So many blocks stand between the corner and the visible one's near face, along the
+                    // axis where they are most.
+                    std::int64_t nearest = 200;
+                    for (const Index3& v : drawn.visible) {
+                        const auto between = [](std::int64_t corner, std::int64_t block) {
+                            return block >= corner ? block - corner : corner - block - 1;
+                        };
+                        nearest =
+                            std::min(nearest, std::max({between(x + low.x, v.x), between(y + low.y, v.y),
+                                                        between(z + low.z, v.z)}));
+                    }
+                    const int clear = drawn.space.clear[static_cast<std::size_t>((z * n.y + y) * n.x + x)];
+                    if (nearest == 200)
+                        ASSERT_GE(clear, 200);
+                    else
+                        ASSERT_EQ(clear, nearest);
+                }
+    }
+}
+
+}  // namespace
+}  // namespace squint::lanes

@@ -1,0 +1,340 @@
+// One picture, whatever draws it: random small scenes give the same bits from the golden model and from the
+// fast path, for every SIMD target of this machine, thread count, tile size, layout, with and without
+// skipping empty space.
+//
+// SQUINT_SCENES sets how many scenes are drawn, SQUINT_SEED the first one's seed: a failure prints both.
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/procedural.h"
+#include "pipeline/machines/lanes/kernels.h"
+#include "pipeline/record.h"
+#include "pipeline/render.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <random>
+#include <sstream>
+#include <string>
+
+namespace squint {
+namespace {
+
+class Draw {
+  public:
+    explicit Draw(unsigned seed) : random_(seed) {}
+    std::int64_t between(std::int64_t low, std::int64_t high) {  // both included
+        return low + static_cast<std::int64_t>(random_() % static_cast<std::uint64_t>(high - low + 1));
+    }
+    bool once_in(int n) { return between(1, n) == 1; }
+    double real(double low, double high) {
+        return low + (high - low) * static_cast<double>(random_() >> 11) * 0x1p-53;
+    }
+    template <class T>
+    T one_of(std::initializer_list<T> values) {
+        return values.begin()[between(0, static_cast<std::int64_t>(values.size()) - 1)];
+    }
+    template <class E>
+    E any_of() {
+        return static_cast<E>(between(0, static_cast<std::int64_t>(std::size(EnumNames<E>::names)) - 1));
+    }
+    Vec3 vector(double low, double high) { return {real(low, high), real(low, high), real(low, high)}; }
+
+  private:
+    std::mt19937_64 random_;
+};
+
+/// White noise: every cell differs from its neighbours as much as a cell can.
+double noise_at(const Vec3& p) {
+    auto bits = static_cast<std::uint64_t>(p.x * 1e6) * 0x9e3779b97f4a7c15u ^
+                static_cast<std::uint64_t>(p.y * 1e6) * 0xc2b2ae3d27d4eb4fu ^
+                static_cast<std::uint64_t>(p.z * 1e6) * 0x165667b19e3779f9u;
+    bits = (bits ^ bits >> 31) * 0xbf58476d1ce4e5b9u;
+    return static_cast<double>((bits ^ bits >> 29) >> 11) * 0x1p-53;
+}
+
+std::shared_ptr<const Volume> draw_volume(Draw& draw, Scene& scene) {
+    static const ProceduralField noise{"noise", "", 8, 16, noise_at, [](const Vec3&) { return Vec3(); }};
+    const auto& fields = procedural_fields();
+    const auto which =
+        static_cast<std::size_t>(draw.between(0, static_cast<std::int64_t>(fields.size()) + 1));
+    const ProceduralField& field = which < fields.size() ? fields[which] : noise;
+    Index3 dims{draw.between(8, 33), draw.between(8, 33), draw.between(8, 33)};  // braces: in that order
+    if (draw.once_in(16)) dims[static_cast<int>(draw.between(0, 2))] = 1;
+    const int bits = draw.one_of({8, 8, 12, 12, 16, 5});
+    const Vec3 spacing = draw.once_in(3) ? Vec3(1, 1, 1) : draw.vector(0.3, 2.5);
+    scene.volume.procedural = field.name;  // for the message: `noise` is this file's own
+    scene.volume.dims = {dims.x, dims.y, dims.z};
+    scene.volume.bits = bits;
+    scene.volume.spacing = {spacing.x, spacing.y, spacing.z};
+    return std::make_shared<Volume>(make_procedural(field, dims, bits, spacing));
+}
+
+void draw_transfer_function(Draw& draw, const Volume& volume, Scene& scene) {
+    TransferFunctionSettings& function = scene.transfer_function;
+    function = {};
+    function.unit_distance = draw.real(0.3, 4);
+    function.entries = draw.one_of({0, 0, 0, 2, 3, 17, 256, 1000});
+    std::vector<double> values;
+    for (std::int64_t i = draw.between(1, 7); i >= 0; --i) {
+        values.push_back(std::floor(draw.real(0, volume.largest_representable() + 1.0)));
+        if (draw.once_in(4)) values.push_back(values.back());  // a step
+    }
+    std::sort(values.begin(), values.end());
+    const bool clear_start = draw.once_in(2);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        double alpha = draw.one_of({0.0, 0.0, 1.0, draw.real(0, 1), draw.real(0, 1), draw.real(0, 0.02)});
+        if (i < 2 && clear_start) alpha = 0;
+        function.points.push_back(
+            {values[i], draw.real(0, 1), draw.one_of({0.0, 1.0, draw.real(0, 1)}), draw.real(0, 1), alpha});
+    }
+}
+
+void draw_camera(Draw& draw, const Volume& volume, Scene& scene) {
+    CameraSettings& camera = scene.camera;
+    camera = {};
+    const Vec3 high =
+        volume.world_from_voxel(Vec3(volume.dims.x - 1.0, volume.dims.y - 1.0, volume.dims.z - 1.0));
+    camera.projection = draw.any_of<Projection>();
+    camera.azimuth = draw.one_of({0.0, 90.0, 45.0, draw.real(0, 360)});
+    camera.elevation = draw.one_of({0.0, 90.0, -90.0, draw.real(-90, 90)});
+    camera.fov_y = draw.real(5, 120);
+    if (draw.once_in(3)) {  // inside the volume, or beside it
+        camera.eye = draw.vector(-0.2, 1.2) * high;
+        camera.center = draw.vector(0, 1) * high;
+    }
+    if (draw.once_in(4)) camera.height = draw.real(0.1, 1.5) * std::max({high.x, high.y, high.z});
+    if (draw.once_in(5)) scene.clip.low = draw.vector(-0.1, 0.5) * high;
+    if (draw.once_in(5)) scene.clip.high = draw.vector(0.5, 1.1) * high;
+}
+
+void draw_light(Draw& draw, Scene& scene) {
+    scene.lights.clear();
+    for (std::int64_t l = draw.between(-1, 3); l > 0; --l) {
+        Light light;
+        light.headlight = draw.once_in(3);
+        light.direction = draw.one_of({draw.vector(-1, 1), Vec3(0, 0, 1), Vec3(-1, 0, 0)});
+        if (draw.once_in(4)) light.color = draw.vector(0, 1);
+        scene.lights.push_back(light);
+    }
+    ShadingSettings& shading = scene.shading;
+    shading.model = draw.once_in(2) ? ShadingModel::phong : ShadingModel::blinn_phong;
+    shading.gradient = draw.one_of({GradientRule::central, GradientRule::sobel, GradientRule::analytic,
+                                    GradientRule::central, GradientRule::central_samples});
+    shading.ka = draw.real(0, 1), shading.kd = draw.real(0, 1), shading.ks = draw.real(0, 1);
+    shading.power = draw.any_of<PowerRule>();
+    shading.exponent = shading.power == PowerRule::squaring
+                           ? std::ldexp(1.0, static_cast<int>(draw.between(0, 7)))
+                           : draw.real(1, 200);
+    shading.two_sided = draw.once_in(3);
+}
+
+/// Any format, rounding and overflow rule for a wire, not far from the one it has: the plan refuses some.
+std::string any_spec(Draw& draw, Spec spec) {
+    Format& f = spec.format;
+    f.fraction_bits = static_cast<int>(draw.between(0, std::min(kMostFractionBits, f.fraction_bits + 6)));
+    if (draw.once_in(3))
+        f.integer_bits =
+            static_cast<int>(std::clamp<std::int64_t>(f.integer_bits + draw.between(-1, 4), 0, 24));
+    if (draw.once_in(8)) f.is_signed = !f.is_signed;
+    if (f.integer_bits + f.fraction_bits < 1) f.fraction_bits = 1;
+    spec.rounding = draw.one_of({Rounding::trn, Rounding::trn_zero, Rounding::rnd, Rounding::rnd_conv});
+    spec.overflow = draw.once_in(4) ? Overflow::wrap : Overflow::sat;
+    return to_string(spec);
+}
+
+struct Case {
+    Scene scene;
+    Plan plan;
+};
+
+/// A preset that can hold the scene: `squeeze` takes 12-bit data and steps below two voxels only.
+Plan plan_for(const std::shared_ptr<const Volume>& volume, Scene& scene) {
+    try {
+        return make_plan(scene, volume);
+    } catch (const InputError&) {
+        scene.precision.preset = "default";
+        return make_plan(scene, volume);
+    }
+}
+
+Plan draw_precision(Draw& draw, const std::shared_ptr<const Volume>& volume, Scene& scene) {
+    scene.precision.preset = draw.one_of<const char*>({"default", "default", "squeeze", "eight_bit", "wide"});
+    Plan plan = plan_for(volume, scene);
+    if (draw.once_in(3)) return plan;
+    for (int attempt = 0, wires = static_cast<int>(draw.between(1, 8)); attempt < 6; ++attempt) {
+        Scene wired = scene;
+        for (int i = 0; i < wires; ++i) {
+            const auto wire = static_cast<std::size_t>(draw.between(0, kWires - 1));
+            wired.precision.override_[wire] = any_spec(draw, plan.specs[static_cast<Wire>(wire)]);
+        }
+        try {
+            Plan changed = make_plan(wired, volume);
+            scene = wired;
+            return changed;
+        } catch (const InputError&) {
+            wires = std::max(1, wires / 2);
+        }
+    }
+    return plan;
+}
+
+/// A scene and its plan; throws InputError for the few that are refused (a camera looking along its own up).
+Case draw_case(unsigned seed, const std::string& preset) {
+    Draw draw(seed);
+    Scene scene = built_in_scene();
+    scene.image.width = scene.image.height = 24;
+    scene.output.fixed = scene.output.samples = scene.output.transparency = true;
+    scene.output.depth = draw.once_in(3), scene.output.normals = draw.once_in(3);
+    const std::shared_ptr<const Volume> volume = draw_volume(draw, scene);
+    draw_transfer_function(draw, *volume, scene);
+    draw_camera(draw, *volume, scene);
+    draw_light(draw, scene);
+    scene.sampling.step = draw.one_of({1.0, 0.5, 0.25, draw.real(0.25, 4), draw.real(0.25, 4)});
+    scene.sampling.termination = draw.one_of({1.0 / 1024, 0.0, draw.real(0, 0.999), 0.99});
+    scene.sampling.position = draw.any_of<PositionRule>();
+    if (draw.once_in(6)) scene.sampling.interpolation = InterpolationRule::nearest;
+    scene.classification = {};
+    ClassificationSettings& method = scene.classification;
+    method.method = draw.one_of({Method::pc, Method::pc_mid, draw.any_of<Method>(), draw.any_of<Method>()});
+    method.order = static_cast<int>(method.method == Method::leg ? draw.between(2, 4) : draw.between(1, 5));
+    method.table_size = 64;
+    method.lookup = draw.any_of<TableLookup>();
+    method.opaque_prediction = !draw.once_in(8);
+    if (draw.once_in(5)) scene.classification.encoding = AlphaEncoding::sqrt_alpha;
+    if (draw.once_in(6)) scene.compositing.mode = draw.any_of<CompositingMode>();
+    scene.compositing.form = draw.any_of<CompositingForm>();
+    if (!preset.empty()) {
+        scene.precision.preset = preset;
+        if (!draw.once_in(4)) {  // what floats have lanes for
+            scene.output.depth = scene.output.normals = false;
+            scene.compositing.mode = CompositingMode::over;
+            if (scene.shading.gradient == GradientRule::central_samples)
+                scene.shading.gradient = GradientRule::central;
+        }
+        return {scene, make_plan(scene, volume)};
+    }
+    Plan plan = draw_precision(draw, volume, scene);
+    return {scene, std::move(plan)};
+}
+
+/// What is not every scene's, and runs in lanes all the same: how often it was drawn, and how often it did.
+struct Share {
+    const char* name;
+    bool (*has)(const Plan& plan);
+    unsigned drawn = 0, in_lanes = 0;
+};
+std::vector<Share> shares() {
+    return {
+        {"mip", [](const Plan& p) { return p.scene.compositing.mode == CompositingMode::mip; }},
+        {"minip", [](const Plan& p) { return p.scene.compositing.mode == CompositingMode::minip; }},
+        {"average", [](const Plan& p) { return p.scene.compositing.mode == CompositingMode::average; }},
+        {"depth", [](const Plan& p) { return p.scene.output.depth && !p.projection_mode; }},
+        {"normals", [](const Plan& p) { return p.scene.output.normals && p.lit; }},
+        {"gradients from samples", [](const Plan& p) { return p.gradient_from_samples(); }},
+        {"one voxel thick along x", [](const Plan& p) { return p.volume->dims.x == 1; }},
+    };
+}
+
+RenderOptions draw_options(Draw& draw) {
+    const std::vector<std::string> targets = lanes::target_names();
+    RenderOptions options;
+    options.threads = draw.one_of({1, 2, 7});
+    options.tile = static_cast<int>(draw.between(1, 33));
+    options.target =
+        targets[static_cast<std::size_t>(draw.between(0, static_cast<std::int64_t>(targets.size()) - 1))];
+    if (const char* only = std::getenv("SQUINT_TARGET")) options.target = only;
+    options.layout = draw.any_of<LayoutRule>();
+    options.skip = !draw.once_in(4);
+    return options;
+}
+
+/// Empty, or the first difference.
+std::string first_difference(const Image& expected, const Image& actual) {
+    for (const Channel& channel : expected.channels) {
+        const Channel* other = actual.find(channel.name);
+        if (!other) return "channel " + channel.name + " is missing";
+        const std::size_t pixels = static_cast<std::size_t>(expected.width * expected.height);
+        for (std::size_t i = 0; i < pixels; ++i) {
+            const bool same = channel.is_words()
+                                  ? channel.words[i] == other->words[i]
+                                  : std::memcmp(&channel.values[i], &other->values[i], sizeof(float)) == 0;
+            if (same) continue;
+            std::ostringstream text;
+            text << channel.name << " at pixel (" << i % 24 << ", " << i / 24 << "): the model has ";
+            if (channel.is_words())
+                text << channel.words[i] << ", found " << other->words[i];
+            else
+                text << channel.values[i] << ", found " << other->values[i];
+            return text.str();
+        }
+    }
+    return {};
+}
+
+unsigned from_environment(const char* name, unsigned otherwise) {
+    const char* text = std::getenv(name);
+    return text ? static_cast<unsigned>(std::strtoul(text, nullptr, 10)) : otherwise;
+}
+
+/// `preset`: any for an empty one.
+void compare_random_scenes(unsigned usual_count, const std::string& preset) {
+    const unsigned scenes = from_environment("SQUINT_SCENES", usual_count),
+                   first = from_environment("SQUINT_SEED", 1);
+    RenderOptions golden;
+    golden.threads = 1, golden.path = Path::model;
+    unsigned drawn = 0, refused = 0, in_lanes = 0, failures = 0;
+    Hasher pictures;
+    std::vector<Share> kinds = shares();
+    for (unsigned seed = first; seed < first + scenes; ++seed) {
+        Draw draw(seed + 0x5eed);
+        const RenderOptions options = draw_options(draw);
+        try {
+            const Case c = draw_case(seed, preset);
+            const Image model = render(c.plan, golden).image;
+            const Rendering fast = render(c.plan, options);
+            ++drawn;
+            pictures.text(picture_hash(model));
+            in_lanes += fast.statistics.path == "lanes";
+            for (Share& kind : kinds)
+                if (kind.has(c.plan)) ++kind.drawn, kind.in_lanes += fast.statistics.path == "lanes";
+            const std::string wrong = first_difference(model, fast.image);
+            if (wrong.empty()) continue;
+            ADD_FAILURE() << wrong << "\nseed " << seed << ", target " << options.target << ", threads "
+                          << options.threads << ", tile " << options.tile << ", skip " << options.skip << ", "
+                          << fast.statistics.why << '\n'
+                          << to_toml(c.scene);
+            if (++failures == 3) break;
+        } catch (const InputError& error) {
+            ++refused;
+            EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << "seed " << seed;
+        }
+    }
+    EXPECT_LE(10 * refused, drawn) << "scenes are drawn to be accepted";
+    EXPECT_GE(2 * in_lanes, drawn) << "most scenes should run in lanes";
+    if (scenes >= 300 && preset.empty())
+        for (const Share& kind : kinds) {
+            EXPECT_GE(kind.drawn, 2u) << kind.name;
+            EXPECT_GE(2 * kind.in_lanes, kind.drawn) << kind.name << ": most should run in lanes";
+        }
+    // The model's own bits, to be compared between compilers and machines.
+    std::printf("pictures %s\n", pictures.hex().c_str());
+    testing::Test::RecordProperty("drawn", static_cast<int>(drawn));
+    testing::Test::RecordProperty("in_lanes", static_cast<int>(in_lanes));
+}
+
+TEST(SameBits, RandomScenesHaveTheModelsBitsOnEveryPath) {
+    compare_random_scenes(300, "");
+}
+
+// The model of float32 lanes is the scalar float.
+TEST(SameBits, RandomScenesInFloat32HaveTheModelsBitsOnEveryPath) {
+    compare_random_scenes(300, "float32");
+}
+
+}  // namespace
+}  // namespace squint

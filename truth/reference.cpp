@@ -1,0 +1,365 @@
+#include "truth/reference.h"
+
+#include "core/portable_math.h"
+#include "pipeline/render.h"
+#include "truth/reference_field.h"
+#include "truth/reference_light.h"
+#include "truth/reference_matter.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <thread>
+
+namespace squint {
+namespace reference {
+namespace {
+
+constexpr double kSpent = 1e-12;    // transparency below which nothing behind is seen
+constexpr double kSpentDepth = 40;  // exp(-40) = 4e-18
+constexpr int kMostHalvings = 48;   // a jump of the light's direction is pinned down to a rounding
+
+// Gauss-Legendre with 3 points and Kronrod's extension to 7, on [-1, 1].  Exact to degrees 5 and 11.
+constexpr std::array<double, 7> kNode{
+    -0.960491268708020283423507092629080, -0.774596669241483377035853079956480,
+    -0.434243749346802558002071502844628, 0,
+    0.434243749346802558002071502844628,  0.774596669241483377035853079956480,
+    0.960491268708020283423507092629080};
+constexpr std::array<double, 7> kKronrod{
+    0.104656226026467265193823857192073, 0.268488089868333440728569280666710,
+    0.401397414775962222905051818618432, 0.450916538658474142345110087045571,
+    0.401397414775962222905051818618432, 0.268488089868333440728569280666710,
+    0.104656226026467265193823857192073};
+constexpr std::array<double, 7> kGauss{0, 5.0 / 9, 0, 8.0 / 9, 0, 5.0 / 9, 0};
+
+/// exp(-x), x >= 0.  Most pieces are thin: eight terms of the series are below a rounding up to 1/32.
+inline double attenuation(double x) {
+    if (x > 0.03125) return portable::exp(-x);
+    const double y = x * x;
+    return (1 - x) + y * ((1.0 / 2 - x * (1.0 / 6)) +
+                          y * ((1.0 / 24 - x * (1.0 / 120)) + y * (1.0 / 720 - x * (1.0 / 5040))));
+}
+
+/// A piece of a ray between two knots, q from 0 to 1.
+struct Piece {
+    Cubic rise;                     // of the coordinate above the stretch's first entry
+    std::array<double, 5> depth{};  // optical depth from the piece's front, a quartic
+    double length = 0;              // world units
+    const Stretch* stretch = nullptr;
+
+    double depth_at(double q) const {
+        return q * (depth[1] + q * (depth[2] + q * (depth[3] + q * depth[4])));
+    }
+    double extinction_at(double q) const {
+        return stretch->extinction + stretch->extinction_slope * rise.at(q);
+    }
+    Vec3 color_at(double q) const { return stretch->color + stretch->color_slope * rise.at(q); }
+};
+
+Piece piece_of(const Cubic& coordinate, double from, double to, double length, const Stretch& stretch) {
+    Piece piece;
+    piece.rise = coordinate.stretched(from, to - from);
+    piece.rise.c[0] -= stretch.first;
+    piece.length = length * (to - from);
+    piece.stretch = &stretch;
+    for (std::size_t k = 0; k < 4; ++k)
+        piece.depth[k + 1] =
+            piece.length * stretch.extinction_slope * piece.rise.c[k] / static_cast<double>(k + 1);
+    piece.depth[1] += piece.length * stretch.extinction;
+    return piece;
+}
+
+/// The integral of f over [from, to], part of a piece whose depth sets how far the eye reaches: halves until
+/// the two rules agree.
+template <class Value, class F, class Size>
+Value integrate(const Piece& piece, const F& f, const Size& size, double from, double to, double allowed,
+                int halvings = 0) {
+    const double front = piece.depth_at(from);
+    if (front > kSpentDepth) return Value(0);
+    const double middle = (from + to) / 2, half = (to - from) / 2;
+    if (piece.depth_at(to) - front <= 2 || halvings >= kMostHalvings) {
+        Value kronrod(0), gauss(0);
+        for (std::size_t i = 0; i < 7; ++i) {
+            const Value value = f(middle + half * kNode[i]);
+            kronrod += value * kKronrod[i], gauss += value * kGauss[i];
+        }
+        if (halvings >= kMostHalvings || size((kronrod - gauss) * half) <= allowed) return kronrod * half;
+    }
+    return integrate<Value>(piece, f, size, from, middle, allowed / 2, halvings + 1) +
+           integrate<Value>(piece, f, size, middle, to, allowed / 2, halvings + 1);
+}
+
+double largest(const Vec3& v) {
+    return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+}
+
+/// Light of an unlit piece that reaches its front.  By parts, with T = exp(-depth):
+///     integral of c tau T = c(0) (1 - T(1)) + c' integral of s' (T - T(1)):  one integral for three colours.
+Vec3 emission(const Piece& piece, double clear, double allowed) {
+    const Stretch& s = *piece.stretch;
+    Vec3 light = piece.color_at(0) * (1 - clear);
+    const double slope = largest(s.color_slope);
+    if (s.one_color || slope == 0) return light;
+    const double integral = integrate<double>(
+        piece, [&](double q) { return piece.rise.slope(q) * (attenuation(piece.depth_at(q)) - clear); },
+        [](double x) { return std::abs(x); }, 0, 1, allowed / slope);
+    return light + s.color_slope * integral;
+}
+
+/// The same where light falls: c tau T with c as the lights make it.
+template <class Reflect>
+Vec3 lit_emission(const Piece& piece, const Reflect& reflect, double allowed) {
+    return integrate<Vec3>(
+        piece,
+        [&](double q) {
+            const Reflection light = reflect(q);
+            return (piece.color_at(q) * light.diffuse + light.specular) *
+                   (piece.extinction_at(q) * piece.length * attenuation(piece.depth_at(q)));
+        },
+        largest, 0, 1, allowed);
+}
+
+/// Where a polynomial that is monotone on [low, high] and passes `target` there does so: Halley's method,
+/// held between bounds that close in.  At a turning point its step is zero far from any root: the value
+/// decides.
+double crossing(const Cubic& p, double target, double low, double high, bool upwards) {
+    double r = low;
+    for (int i = 0; i < 100 && high - low > 1e-16; ++i) {
+        const double value = p.at(r) - target, slope = p.slope(r), curve = p.c[2] + 3 * p.c[3] * r;
+        if (std::abs(value) <= kTouch / 10) break;
+        ((value < 0) == upwards ? low : high) = r;
+        const double next = r - value * slope / (slope * slope - value * curve);
+        r = next > low && next < high ? next : (low + high) / 2;
+    }
+    return r;
+}
+
+/// Colour and transparency gathered along one ray.
+class RayIntegral {
+  public:
+    RayIntegral(const Plan& plan, const Matter& matter, const RayLight* light, double allowed_per_length)
+        : plan_(plan), matter_(matter), light_(light), allowed_per_length_(allowed_per_length) {}
+
+    /// Adds a cell; false where the ray ends in it.
+    bool add(const Passage& passage, const Corners& corners);
+    std::array<double, 4> pixel() const { return {color_.x, color_.y, color_.z, 1 - clear_}; }
+
+  private:
+    bool add_monotone(double from, double to);
+    void add_piece(double from, double to, const Stretch& stretch);
+    void end_at(double r, double coordinate);
+    Reflection reflection_at(double r) const;
+
+    const Plan& plan_;
+    const Matter& matter_;
+    const RayLight* light_;
+    double allowed_per_length_;
+    Vec3 color_{0, 0, 0};
+    double clear_ = 1;
+    // The cell at hand.
+    Cubic coordinate_;
+    std::array<Cubic, 3> gradient_;
+    double length_ = 0;
+};
+
+Reflection RayIntegral::reflection_at(double r) const {
+    return (*light_)(Vec3(gradient_[0].at(r), gradient_[1].at(r), gradient_[2].at(r)));
+}
+
+/// An opaque surface: nothing behind it is seen.
+void RayIntegral::end_at(double r, double coordinate) {
+    Vec3 color = matter_.color_at(coordinate);
+    if (light_) {
+        const Reflection light = reflection_at(r);
+        color = color * light.diffuse + light.specular;
+    }
+    color_ += color * clear_;
+    clear_ = 0;
+}
+
+void RayIntegral::add_piece(double from, double to, const Stretch& stretch) {
+    if (stretch.clear || !(to > from)) return;
+    const Piece piece = piece_of(coordinate_, from, to, length_, stretch);
+    // A rounding is the least that can be asked of a piece.
+    const double allowed = std::max(allowed_per_length_ * piece.length / clear_, 1e-15);
+    const double through = attenuation(std::max(piece.depth_at(1), 0.0));
+    const Vec3 light =
+        light_ ? lit_emission(
+                     piece, [&](double q) { return reflection_at(from + q * (to - from)); }, allowed)
+               : emission(piece, through, allowed);
+    color_ += light * clear_;
+    clear_ *= through;
+}
+
+/// From knot to knot along a part of the cell where the field only rises or only falls.
+bool RayIntegral::add_monotone(double from, double to) {
+    const double first = coordinate_.at(from), last = coordinate_.at(to);
+    const bool upwards = last > first;
+    int index = matter_.stretch_at(first, upwards);
+    for (double here = from;;) {
+        const Stretch& stretch = matter_.stretch(index);
+        const int knot = upwards ? stretch.last : stretch.first;
+        const double left = upwards ? last - knot : knot - last;  // beyond the knot
+        const double next = left > 0 ? crossing(coordinate_, knot, here, to, upwards) : to;
+        add_piece(here, next, stretch);
+        if (clear_ < kSpent) return false;
+        if (left < -kTouch) return true;
+        if (matter_.opaque_entry(knot)) {
+            end_at(next, knot);
+            return false;
+        }
+        index += upwards ? 1 : -1;
+        if (left <= kTouch || index < 0 || index >= matter_.stretches()) return true;
+        here = next;
+    }
+}
+
+bool RayIntegral::add(const Passage& passage, const Corners& corners) {
+    const double per_entry = plan_.entries.scalars_per_entry;
+    const auto [least, greatest] = std::minmax_element(corners.begin(), corners.end());
+    if (!matter_.visible(*least / per_entry, *greatest / per_entry)) return true;
+    coordinate_ = along(corners, passage);
+    for (double& c : coordinate_.c) c /= per_entry;
+    length_ = passage.length;
+    if (light_) gradient_ = gradient_along(*plan_.volume, plan_.scene.shading.gradient, passage);
+    if (matter_.opaque_at(coordinate_.at(0))) {
+        end_at(0, coordinate_.at(0));
+        return false;
+    }
+    const Turns turns = turns_of(coordinate_);
+    double from = 0;
+    for (int i = 0; i <= turns.count; ++i) {
+        const double to = i < turns.count ? turns.at[static_cast<std::size_t>(i)] : 1;
+        if (!add_monotone(from, to)) return false;
+        from = to;
+    }
+    return true;
+}
+
+/// Least, greatest or mean coordinate of the field along a ray.
+double projected(const Plan& plan, CellWalk& walk, double chord) {
+    const CompositingMode mode = plan.scene.compositing.mode;
+    const double sign = mode == CompositingMode::minip ? -1 : 1;
+    double greatest = -INFINITY, sum = 0;
+    for (Passage passage; walk.next(passage);) {
+        const Cubic field = along(corners_of(*plan.volume, passage.cell), passage);
+        sum += passage.length * (field.c[0] + field.c[1] / 2 + field.c[2] / 3 + field.c[3] / 4);
+        greatest = std::max({greatest, sign * field.at(0), sign * field.at(1)});
+        const Turns turns = turns_of(field);
+        for (int i = 0; i < turns.count; ++i)
+            greatest = std::max(greatest, sign * field.at(turns.at[static_cast<std::size_t>(i)]));
+    }
+    const double scalar = mode == CompositingMode::average ? sum / chord : sign * greatest;
+    return std::clamp(scalar / plan.entries.scalars_per_entry, 0.0, plan.entries.size() - 1.0);
+}
+
+/// A plan, ready to be integrated.
+class Reference {
+  public:
+    Reference(const Plan& plan, double tolerance, bool many_rays);
+    std::array<double, 4> pixel(int column, int row) const;
+
+  private:
+    Vec3 corner(bool high) const;
+    const Plan& plan_;
+    double tolerance_;
+    Vec3 low_, high_;
+    Matter matter_;
+    std::unique_ptr<Blocks> blocks_;
+};
+
+/// Of the volume's box and the scene's clip box together.
+Vec3 Reference::corner(bool high) const {
+    const Volume& v = *plan_.volume;
+    const auto& clip = high ? plan_.scene.clip.high : plan_.scene.clip.low;
+    Vec3 corner = high ? v.origin + v.spacing * Vec3(v.dims - Index3(1)) : v.origin;
+    for (int a = 0; clip && a < 3; ++a)
+        corner[a] = high ? std::min(corner[a], (*clip)[a]) : std::max(corner[a], (*clip)[a]);
+    return corner;
+}
+
+// Of the tolerance, a quarter goes to knots left out, along the longest ray, and half to quadrature.
+Reference::Reference(const Plan& plan, double tolerance, bool many_rays)
+    : plan_(plan),
+      tolerance_(tolerance),
+      low_(corner(false)),
+      high_(corner(true)),
+      matter_(plan.entries,
+              tolerance / 8 / std::max((high_ - low_).length(), plan.volume->smallest_spacing()),
+              tolerance / 8) {
+    const bool skips = plan.scene.compositing.mode == CompositingMode::over;
+    const double per_entry = plan.entries.scalars_per_entry;
+    if (skips && many_rays)
+        blocks_ = std::make_unique<Blocks>(*plan.volume, [&](double least, double greatest) {
+            return matter_.visible(least / per_entry, greatest / per_entry);
+        });
+}
+
+std::array<double, 4> Reference::pixel(int column, int row) const {
+    const Ray ray = plan_.camera.ray(column, row);
+    const Interval inside = intersect(ray, low_, high_);
+    if (inside.empty()) return {};
+    const double chord = inside.last - inside.first;
+    CellWalk walk(*plan_.volume, ray, inside, blocks_.get());
+    if (plan_.scene.compositing.mode != CompositingMode::over) {
+        const double at = projected(plan_, walk, chord);
+        const double depth = matter_.extinction_at(at) * plan_.entries.unit_distance;
+        const double alpha = matter_.opaque_at(at) ? 1 : -portable::expm1(-depth);
+        const Vec3 color = matter_.color_at(at) * alpha;
+        return {color.x, color.y, color.z, alpha};
+    }
+    const RayLight light(plan_.scene, plan_.camera, ray.direction);
+    RayIntegral integral(plan_, matter_, plan_.lit ? &light : nullptr, tolerance_ / 2 / chord);
+    for (Passage passage; walk.next(passage);)
+        if (!integral.add(passage, corners_of(*plan_.volume, passage.cell))) break;
+    return integral.pixel();
+}
+
+}  // namespace
+}  // namespace reference
+
+std::array<double, 4> reference_pixel(const Plan& plan, int column, int row, double tolerance) {
+    return reference::Reference(plan, tolerance, false).pixel(column, row);
+}
+
+Image render_reference(const Plan& plan, const ReferenceOptions& options) {
+    Image image;
+    image.width = plan.camera.width, image.height = plan.camera.height;
+    for (const char* name : {"R", "G", "B", "A"}) image.add_float(name);
+    const reference::Reference reference(plan, options.tolerance, true);
+
+    constexpr int kTile = 16;
+    const int across = (image.width + kTile - 1) / kTile,
+              tiles = across * ((image.height + kTile - 1) / kTile);
+    std::atomic<int> done{0};
+    std::atomic<bool> stopped{false};
+    const auto render_tile = [&](int tile) {
+        const int left = tile % across * kTile, top = tile / across * kTile;
+        for (int row = top; row < std::min(top + kTile, image.height); ++row)
+            for (int column = left; column < std::min(left + kTile, image.width); ++column) {
+                const std::array<double, 4> pixel = reference.pixel(column, row);
+                const std::size_t at = static_cast<std::size_t>(row) * static_cast<std::size_t>(image.width) +
+                                       static_cast<std::size_t>(column);
+                for (std::size_t c = 0; c < 4; ++c)
+                    image.channels[c].values[at] = static_cast<float>(pixel[c]);
+            }
+    };
+    const unsigned processors = std::max(1u, std::thread::hardware_concurrency());
+    tbb::task_arena arena(options.threads > 0 ? options.threads : static_cast<int>(processors));
+    arena.execute([&] {
+        tbb::parallel_for(0, tiles, [&](int tile) {
+            if (options.cancelled && *options.cancelled) stopped = true;
+            if (stopped) return;
+            render_tile(tile);
+            if (options.progress) options.progress(static_cast<double>(++done) / tiles);
+        });
+    });
+    if (stopped) throw Cancelled{};
+    return image;
+}
+
+}  // namespace squint
