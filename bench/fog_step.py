@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Fog at ever smaller steps: PSNR of a preset against the same pipeline in double, as a Markdown table.
 
-    bench/fog_step.py [build/release/cli/squint]          # docs/measurements/fog-step.md; minutes: the double path is slow
+    bench/fog_step.py [build/release/cli/squint]          # docs/measurements/rounding.md#fog-at-ever-smaller-steps; minutes: the double path is slow
 """
 import json
 import subprocess

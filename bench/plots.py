@@ -3,7 +3,7 @@
 
     build/release/bench/bench_equal_error scenes=figure_5,cthead_translucent,figure_7,figure_8,head size=128 every=2 \
         all=1 finest=0.25 > out/plots.jsonl
-    bench/plots.py out/plots.jsonl docs/images > docs/measurements/time-error.md       # and docs/images/time_error_SCENE.svg
+    bench/plots.py out/plots.jsonl docs/images    # the second half of docs/measurements/time-error.md      # and docs/images/time_error_SCENE.svg
 
 A line a method, a mark a step: 4 voxels is the leftmost mark as a rule, 1/4 the rightmost.  Up and to the left is better.
 """
