@@ -18,7 +18,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// The hash of the picture below.  It changes only when a picture's meaning does (CONVENTIONS.md).
+// The hash of the picture below.  It changes only when a picture's meaning does (docs/conventions.md).
 constexpr const char* kSelfTestHash = "d5d997b12f72b1bf6e9e15d03f5390a2";
 
 /// A lit ball in a shell, 32x32 pixels of words, by one path.

@@ -1,4 +1,4 @@
-// Cameras and rays in world space (CONVENTIONS.md, "Space and rays").
+// Cameras and rays in world space (docs/conventions.md#space-and-rays).
 #pragma once
 
 #include "core/vector.h"

@@ -1,5 +1,5 @@
 // exp, log, pow, sin, cos and friends with the same bits on every CPU: only + - * / sqrt, compiled with
-// -ffp-contract=off. libm's differ in the last bit with the CPU's features (CONVENTIONS.md, "Numbers").
+// -ffp-contract=off. libm's differ in the last bit with the CPU's features (docs/conventions.md#numbers).
 #pragma once
 
 #include <span>

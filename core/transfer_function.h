@@ -1,5 +1,5 @@
 // The transfer function: control points in the file's units -> E entries over the scalar range, which *are*
-// the function for every method and for the reference (CONVENTIONS.md, "Scalars and transfer function").
+// the function for every method and for the reference (docs/conventions.md#scalars-and-transfer-function).
 #pragma once
 
 #include "core/vector.h"

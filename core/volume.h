@@ -20,8 +20,8 @@ struct VoxelRun {
     std::int64_t first = 0, end = 0;
 };
 
-/// Scalars are levels: stored value minus the smallest the type or a declared window allows (CONVENTIONS.md,
-/// "Scalars"). A volume is immutable and cheap to copy; its voxels are shared, in memory or mapped from a
+/// Scalars are levels: stored value minus the smallest the type or a declared window allows
+/// (docs/conventions.md#scalars-and-transfer-function). A volume is immutable and cheap to copy; its voxels are shared, in memory or mapped from a
 /// file.
 struct Volume {
     Index3 dims{0, 0, 0};   // voxels along x, y, z; x runs fastest

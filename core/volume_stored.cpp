@@ -1,4 +1,4 @@
-// Voxels as a file stores them -> a volume of levels (CONVENTIONS.md, "Scalars and transfer function").
+// Voxels as a file stores them -> a volume of levels (docs/conventions.md#scalars-and-transfer-function).
 #include "core/volume_stored.h"
 
 #include "core/error.h"

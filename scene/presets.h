@@ -1,4 +1,4 @@
-// Precision presets: a Spec for every wire (CONVENTIONS.md, "Presets"; the table is in docs/pipeline.md).
+// Precision presets: a Spec for every wire (docs/conventions.md#presets; the table is in docs/pipeline.md).
 #pragma once
 
 #include "scene/scene.h"
@@ -27,7 +27,7 @@ const std::vector<std::string>& preset_names();
 
 /// Fraction bits that `default` gives what adds up along a ray (opacities, T, C, prefix sums).  15, which
 /// 32-bit words multiply, at steps of half a voxel or more and up to 4096 samples; beyond, 9 + log2(samples),
-/// which keeps half a last bit at every sample below half an LSB8 of the picture (MATH, B5 and C6).
+/// which keeps half a last bit at every sample below half an LSB8 of the picture (docs/math.md#b5 and #c6).
 int accumulating_bits(const PresetInputs& inputs);
 
 /// The presets that round no wire: `real` in double, `float32` in float.

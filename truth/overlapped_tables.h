@@ -1,5 +1,5 @@
-// Moments in fixed-point words that do not cancel beyond four slabs' size: overlapped level tables (MATH.md,
-// B3.6). Level l has blocks of L = 2^l entries at a stride of L / 2.  Block b holds, from its own start s_b =
+// Moments in fixed-point words that do not cancel beyond four slabs' size: overlapped level tables
+// (docs/math.md#b36). Level l has blocks of L = 2^l entries at a stride of L / 2.  Block b holds, from its own start s_b =
 // b L / 2, the prefixes
 //   D[i] = T_i - T_sb,   M_k[i] = int c (T - T_sb)^k dT   for i = s_b ... s_b + L:  value (b (L + 1) + i -
 //   s_b) of the level.

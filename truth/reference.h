@@ -1,5 +1,5 @@
 // The reference: the exact integral along a ray of the trilinear field through the entries' transfer function
-// (CONVENTIONS.md, "Compositing and output"), in doubles, sharing no arithmetic with the stages.
+// (docs/conventions.md#compositing-and-output), in doubles, sharing no arithmetic with the stages.
 //
 // Inside a cell the field is a cubic polynomial of the distance.  Each of its monotone parts is cut where it
 // meets an entry; between cuts extinction and colour are linear in the field, the optical depth is a quartic,

@@ -1,4 +1,4 @@
-// The light of CONVENTIONS.md in doubles, for the reference: straight from its equations.
+// The light of docs/conventions.md in doubles, for the reference: straight from its equations.
 #pragma once
 
 #include "core/camera.h"

@@ -34,7 +34,7 @@ class Matter {
     int stretch_at(double coordinate, bool upwards) const;
 
     bool opaque_entry(int entry) const { return entries_->entry[static_cast<std::size_t>(entry)].opaque; }
-    /// On an opaque entry or between two (CONVENTIONS.md).
+    /// On an opaque entry or between two (docs/conventions.md).
     bool opaque_at(double coordinate) const;
     double extinction_at(double coordinate) const;
     Vec3 color_at(double coordinate) const;

@@ -46,8 +46,8 @@ TEST(Presets, WideKeepsNineBitsAndTheRaysOwnInTablesAndCompositing) {
     }
 }
 
-// CONVENTIONS.md: `default` rounds halves to even.  Interpolation rounds them up, so that a lerp seen from
-// its other end is the same number (MATH, C2.5; docs/decisions/0002).
+// docs/conventions.md: `default` rounds halves to even.  Interpolation rounds them up, so that a lerp seen from
+// its other end is the same number (docs/math.md#c2; docs/decisions/0002).
 // Interpolation and what tables give back, the input that asks them included: docs/decisions/0002.
 TEST(Presets, DefaultRoundsHalvesToEvenButInInterpolationAndLookups) {
     WireSpecs w;
@@ -82,7 +82,7 @@ TEST(Presets, DefaultFollowsTheStepWhereThirtyTwoBitsHoldNoMore) {
 
 // White fog, one ray through 128 voxels of it, 0.3 to 0.9 opaque.  60 dB is an error of 0.001, and N
 // roundings of half a last bit of 9 + log2(N) bits are 2^-10.  At steps of 1/2 and 1, in 15 bits, fog has 60
-// dB where its opacity's own rounding allows (docs/measurements/fog-step.md).
+// dB where its opacity's own rounding allows (docs/measurements/rounding.md).
 TEST(Presets, DefaultKeepsSixtyDecibelsOfFogAtEveryStep) {
     for (const double opacity : {0.003, 0.01, 0.02})
         for (const char* method : {"pc", "pips"})

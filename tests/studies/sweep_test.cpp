@@ -180,7 +180,7 @@ TEST(SweepPoint, MeasuresNoErrorWhereNothingIsRounded) {
     EXPECT_EQ(record["error"]["real"]["alpha"]["max_error_lsb8"], 0.0);
 }
 
-// White fog: C + T is one at every step of the w form, and truncating equation 9 loses some (MATH.md C1).
+// White fog: C + T is one at every step of the w form, and truncating equation 9 loses some (docs/math.md#c1).
 TEST(SweepPoint, SeesThatTheWFormConservesAndEquation9DoesNot) {
     const SweepFile sweep = parsed(
         "[base]\nvolume.procedural = 'fog'\nvolume.dims = 64\nimage.width = 8\nimage.height = 8\n"

@@ -48,7 +48,7 @@ TEST(Reference, AConstantBoxIsBeersLawInWorldUnits) {
 }
 
 TEST(Reference, ARampOfExtinctionAndColourHasErrorFunctions) {
-    // MATH.md C4: tau = c = s / 255 over lengths 1 and 20, both ways.
+    // docs/math.md#c4: tau = c = s / 255 over lengths 1 and 20, both ways.
     std::vector<int> scalars(256);
     for (int i = 0; i < 256; ++i) scalars[static_cast<std::size_t>(i)] = i;
     const auto entry = [](int i) { return matter(i / 255.0, i / 255.0); };
@@ -62,7 +62,7 @@ TEST(Reference, ARampOfExtinctionAndColourHasErrorFunctions) {
 }
 
 TEST(Reference, OneDeepEntryInsideOneCellIsNotMissed) {
-    // MATH.md C4: tau 0.02 but for one entry of 50; red 0.2 -> 1 -> 0.3.
+    // docs/math.md#c4: tau 0.02 but for one entry of 50; red 0.2 -> 1 -> 0.3.
     const auto entry = [](int i) { return i == 127 ? matter(50, 1) : matter(0.02, i < 127 ? 0.2 : 0.3); };
     expect_pixel(along_row(row_of({126, 127}, 1), true, entry), 0.341505114452317, 0.999999999986250);
     expect_pixel(along_row(row_of({126, 127}, 1), false, entry), 0.983658694313697, 0.999999999986250);

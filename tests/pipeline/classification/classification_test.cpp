@@ -93,7 +93,7 @@ TEST(ClassificationMethods, WideWordsAreWithinHalfAnLsb8OfTheirDoubles) {
     }
 }
 
-// MATH B2: up to the depth at which it cuts, LEG(2) and LEG(3) stay within half an LSB8 of the exact
+// docs/math.md#b2: up to the depth at which it cuts, LEG(2) and LEG(3) stay within half an LSB8 of the exact
 // integral; cut in four pieces, what is left behind three of them is e^-4.5 of an error of 0.18 at most. 0.09
 // LSB8 are rounding (wide) and the colour's step inside an entry.
 TEST(LegendreSeries, DeepSlabsStayWithinTheirBoundOfTheExactIntegral) {

@@ -1,4 +1,4 @@
-// The hard cases of classification (MATH, C4 and B6), each a test by name: what no method may break, and how
+// The hard cases of classification (docs/math.md#c4 and #b6), each a test by name: what no method may break, and how
 // far it may be from the exact integral.
 #include "classification_cases.h"
 #include "core/error.h"
@@ -39,7 +39,7 @@ struct Reference {
     double front, back, length, color, alpha;
 };
 
-// MATH C4's table.  PI2D with a node an entry and wide words holds the integral itself: half a last bit of
+// docs/math.md#c4's table.  PI2D with a node an entry and wide words holds the integral itself: half a last bit of
 // 2^-20 in every cell.
 TEST(HardClassification, ReferenceValuesOfTheRampAndTheSpike) {
     const Reference ramp[] = {{0, 255, 1, 0.249093732179515, 0.393469340287367},

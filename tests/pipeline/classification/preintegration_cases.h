@@ -1,4 +1,4 @@
-// Transfer functions of the accuracy study (MATH.md, part B) and drawn slabs, for the tests of the
+// Transfer functions of the accuracy study (docs/math.md#b1) and drawn slabs, for the tests of the
 // pre-integrated methods.
 #pragma once
 

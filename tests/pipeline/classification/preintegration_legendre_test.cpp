@@ -59,7 +59,7 @@ TEST(LegendreWeight, IsBoundedByOneAndByTheDepth) {
 }
 
 TEST(LegendreSeries, ReproducesTheStudysErrorsOfK) {
-    // MATH.md B2: constant tau, colour 1 in the front half, 0 behind; printed to 3 decimals, one of them a
+    // docs/math.md#b2: constant tau, colour 1 in the front half, 0 behind; printed to 3 decimals, one of them a
     // piecewise step smeared over one entry of 1024, which moves K by less than x / 1024.
     for (const auto& [x, two, four] :
          {std::tuple{1.0, 0.0005, 0.0}, {2.0, 0.004, 0.0}, {3.0, 0.011, 0.0}, {6.0, 0.051, -0.003}}) {
@@ -105,7 +105,7 @@ TEST(LegendreSeries, BeatsPipsOnSlabsOfDepthOneByFarMoreThanSixDecibels) {
 }
 
 TEST(LegendreSeries, HoldsAtTwentyDeepWithABrightFront) {
-    // MATH.md C4.7: C = 0.99995 where PIPS(1) gives 0.5.
+    // docs/math.md#c4: C = 0.99995 where PIPS(1) gives 0.5.
     const Entries entries = cases::entries_of(256, [](int i) { return cases::Matter{20, grey(i < 128)}; });
     const SlabValue value = build_legendre_series(entries, 2, 1).slab(0, 255, 1);
     EXPECT_NEAR(value.color.x, exact_slab(entries, 0, 255, 1).color.x,

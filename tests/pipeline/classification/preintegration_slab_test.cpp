@@ -35,7 +35,7 @@ void expect_in_range(const SlabValue& value) {
 }
 
 TEST(ExactSlab, ReproducesTheTableOfReferenceValues) {
-    // MATH.md C4 prints 15 decimals; the sums here are of fewer than 1000 terms of at most 1: 1e-14 covers
+    // docs/math.md#c4 prints 15 decimals; the sums here are of fewer than 1000 terms of at most 1: 1e-14 covers
     // both.
     struct Reference {
         Entries entries;
@@ -141,7 +141,7 @@ TEST(OpaquePrediction, KeepsTheRateOfTheWholeSlab) {
 }
 
 TEST(OpaquePrediction, OfFiveWallsLeavesOrderOneWithinTheStudysError) {
-    // MATH.md B6: five isosurfaces over a thin base; both directions, inclusive, the rate kept: 0.03 LSB8 at
+    // docs/math.md#b6: five isosurfaces over a thin base; both directions, inclusive, the rate kept: 0.03 LSB8 at
     // 12 bits.
     Entries entries = constant(4096, 0.01, 0.5);
     for (const int i : {500, 1000, 1700, 2500, 3300}) {
@@ -287,7 +287,7 @@ TEST(PrefixTables, PiecewiseAndExactAgreeAtTheEntries) {
 
 TEST(PrefixTables, MomentsRunRightBetweenEntries) {
     // Constant tau and c: X_k(s) = c (tau s)^k, which a linear interpolation of X_k misses for k >= 2
-    // (MATH.md, B4).
+    // (docs/math.md#b4).
     for (const Between between : {Between::exact, Between::piecewise}) {
         const PrefixTables tables = build_prefix_tables(constant(16, 2, 0.5), 5, between);
         for (double s = 0; s <= 15; s += 0.3)
