@@ -2,7 +2,7 @@
 
 #include "core/error.h"
 #include "core/portable_math.h"
-#include "core/rays.h"
+#include "core/rays-inl.h"
 
 #include <fmt/format.h>
 

@@ -9,7 +9,7 @@
 // Real<T>      no rounding: raw units in floating point; shifts are exact multiplications
 // Range        intervals: what a stage's exact results can reach, and so how wide a word it needs
 //              (pipeline/plan/ranges.cpp)
-// Lanes        many samples side by side: lanes.h
+// Lanes        many samples side by side: words/lanes-inl.h
 //
 // Wide<W>      beside W, for the few numbers that need more bits than all others: at the end of this file
 #pragma once

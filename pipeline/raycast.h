@@ -4,13 +4,13 @@
 
 #include "pipeline/plan/plan.h"
 
-#include "pipeline/classification/methods.h"
-#include "pipeline/stages/compositing.h"
-#include "pipeline/stages/gradient.h"
-#include "pipeline/stages/interpolation.h"
-#include "pipeline/stages/location.h"
-#include "pipeline/stages/ray_setup.h"
-#include "pipeline/stages/shading.h"
+#include "pipeline/classification/methods-inl.h"
+#include "pipeline/stages/compositing-inl.h"
+#include "pipeline/stages/gradient-inl.h"
+#include "pipeline/stages/interpolation-inl.h"
+#include "pipeline/stages/location-inl.h"
+#include "pipeline/stages/ray_setup-inl.h"
+#include "pipeline/stages/shading-inl.h"
 
 #include <algorithm>
 #include <array>

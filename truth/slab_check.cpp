@@ -1,5 +1,6 @@
 #include "truth/slab_check.h"
 
+#include "pipeline/classification/methods-inl.h"
 #include "pipeline/classification/tables/exact_slab.h"
 
 #include <algorithm>

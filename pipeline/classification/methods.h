@@ -8,15 +8,13 @@
 //   table describe(ClassificationReport&)        tables and choices, for `squint plan`
 //   build_...(ClassificationInputs) -> M   its table builder
 // and, for every word, classify(const M&, front, back, length) -> Slab.
-// Included once per SIMD target, so that each method's own file is.
+#pragma once
+
 #include "pipeline/classification/moments.h"
 #include "pipeline/classification/pc.h"
 #include "pipeline/classification/pi1d.h"
 #include "pipeline/classification/pi2d.h"
 #include "pipeline/classification/pips.h"
-
-#ifndef SQUINT_PIPELINE_CLASSIFICATION_METHODS_H
-#define SQUINT_PIPELINE_CLASSIFICATION_METHODS_H
 
 #include <variant>
 
@@ -44,4 +42,3 @@ void need_exact(ClassificationMethod& method, ClassificationInputs inputs);
 void need_floats(ClassificationMethod& method);
 
 }  // namespace squint
-#endif

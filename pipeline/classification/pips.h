@@ -7,8 +7,7 @@
 // Exact in alpha.  K is the mean colour weighted by extinction: it cannot tell front from back, and errs by
 // x^2 dc / 8 for a colour that changes by dc inside the slab.  Between rows the colour is their mean: where
 // that shows, an entry has several rows.
-#ifndef SQUINT_PIPELINE_CLASSIFICATION_PIPS_H
-#define SQUINT_PIPELINE_CLASSIFICATION_PIPS_H
+#pragma once
 
 #include "pipeline/classification/prefix.h"
 
@@ -39,96 +38,3 @@ struct PowerSeriesOfOrder1 {
 PowerSeriesOfOrder1 build_power_series_of_order_1(const ClassificationInputs& inputs);
 
 }  // namespace squint
-#endif
-
-#include "pipeline/classification/prefix.h"
-
-#include "fixedpoint/unrolled.h"
-
-#include <hwy/highway.h>
-#if defined(SQUINT_PIPELINE_CLASSIFICATION_PIPS_TARGET) == defined(HWY_TARGET_TOGGLE)
-#ifdef SQUINT_PIPELINE_CLASSIFICATION_PIPS_TARGET
-#undef SQUINT_PIPELINE_CLASSIFICATION_PIPS_TARGET
-#else
-#define SQUINT_PIPELINE_CLASSIFICATION_PIPS_TARGET
-#endif
-HWY_BEFORE_NAMESPACE();
-namespace squint::HWY_NAMESPACE {
-
-/// T and X1 in rows `row` and `row + 1`.
-template <class W>
-HWY_INLINE std::array<std::array<W, 4>, 2> prefix_rows(const PowerSeriesOfOrder1& m, W row) {
-    const auto at = [&](W r) {
-        return std::array<W, 4>{gather(m.prefix.depth, r, 0), gather(m.moment, r, 0), gather(m.moment, r, 1),
-                                gather(m.moment, r, 2)};
-    };
-    return {at(row), at(row + constant<W>(1))};
-}
-/// What the method knows of one sample: the back of a slab is the front of the next.
-template <class W>
-struct PrefixSample {
-    W input;
-    EntryPosition<W> at;           // in rows of T
-    std::array<W, 4> sums, rises;  // T and X1 at the row, and their rise to the next
-};
-template <class W>
-HWY_INLINE PrefixSample<W> sample_of(const PowerSeriesOfOrder1& m, W input) {
-    PrefixSample<W> s{input, sub_entry_position(m.prefix.entries, m.prefix.sub_entry_bits, input), {}, {}};
-    s.at.fraction = within(s.at.fraction, 0, std::int64_t{1} << m.prefix.place_bits());
-    const std::array<std::array<W, 4>, 2> rows = prefix_rows(m, s.at.entry);
-    s.sums = rows[0];
-    const auto rise = [&](std::size_t c)
-                          SQUINT_WRITTEN_OUT { return within(rows[1][c] - rows[0][c], 0, m.most_rise); };
-    s.rises = {rise(0), rise(1), rise(2), rise(3)};
-    return s;
-}
-
-/// The difference of a prefix sum between two samples, exact with place_bits() more fraction bits than its
-/// words.
-template <class W>
-HWY_INLINE Wide<W> prefix_difference(const PrefixSample<W>& front, const PrefixSample<W>& back,
-                                     std::size_t column, int place_bits) {
-    return wide_sum(back.sums[column] - front.sums[column], place_bits,
-                    back.at.fraction * back.rises[column] - front.at.fraction * front.rises[column]);
-}
-/// The slab up to its end, cut or not.
-template <class W>
-HWY_INLINE Slab<W> classify(const PowerSeriesOfOrder1& m, const PrefixSample<W>& front,
-                            const PrefixSample<W>& end, const CutSlab<W>& cut, W length) {
-    const int bits = m.prefix.place_bits();
-    const Wide<W> straight = prefix_difference(front, end, 0, bits);
-    Wide<W> depth = straight;
-    if (m.prefix.curved)
-        depth = shift_left(straight, bits + 1) - (bend_at(m.prefix, end.at) - bend_at(m.prefix, front.at));
-    depth = absolute(depth);
-    const W zero = constant<W>(0), one = constant<W>(m.one_ratio);
-    Slab<W> slab{{zero, zero, zero}, zero};
-    if (any_positive(depth))
-        slab.alpha =
-            opacity_of_depth(m.prefix.entries.opacity,
-                             depth_of(m.prefix, depth, widen(max(cut.span, constant<W>(1))), length));
-    if (any(zero < slab.alpha)) {  // of what is not seen the colour is any
-        const Wide<W> some = max(absolute(straight), widen(constant<W>(1)));
-        for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
-            const Wide<W> colored = absolute(prefix_difference(front, end, c + 1, bits));
-            slab.color[c] = min(divide(colored, some, m.to_ratio), one);
-        });
-    }
-    return finish_straight(m.prefix, cut, front.input, length, slab);
-}
-template <class W>
-HWY_INLINE Slab<W> classify(const PowerSeriesOfOrder1& m, const PrefixSample<W>& front,
-                            const PrefixSample<W>& back, W length) {
-    const CutSlab<W> cut = cut_at_wall(m.prefix, front.input, back.input);
-    if (m.prefix.predicts && any(constant<W>(0) < cut.wall))
-        return classify(m, front, sample_of(m, cut.end_input), cut, length);
-    return classify(m, front, back, cut, length);
-}
-template <class W>
-HWY_INLINE Slab<W> classify(const PowerSeriesOfOrder1& m, W front, W back, W length) {
-    return classify(m, sample_of(m, front), sample_of(m, back), length);
-}
-
-}  // namespace squint::HWY_NAMESPACE
-HWY_AFTER_NAMESPACE();
-#endif

@@ -1,7 +1,7 @@
 #include "pipeline/plan/plan.h"
 
 #include "pipeline/plan/ranges.h"
-#include "pipeline/stages/ray_setup.h"
+#include "pipeline/stages/ray_setup-inl.h"
 
 #include "core/error.h"
 #include "core/portable_math.h"

@@ -1,11 +1,12 @@
 #include "pipeline/plan/ranges.h"
 
 #include "core/error.h"
-#include "pipeline/stages/compositing.h"
-#include "pipeline/stages/gradient.h"
-#include "pipeline/stages/interpolation.h"
-#include "pipeline/stages/location.h"
-#include "pipeline/stages/shading.h"
+#include "pipeline/classification/methods-inl.h"
+#include "pipeline/stages/compositing-inl.h"
+#include "pipeline/stages/gradient-inl.h"
+#include "pipeline/stages/interpolation-inl.h"
+#include "pipeline/stages/location-inl.h"
+#include "pipeline/stages/shading-inl.h"
 
 #include <fmt/format.h>
 

@@ -1,7 +1,7 @@
 #include "core/camera.h"
 
 #include "core/error.h"
-#include "core/rays.h"
+#include "core/rays-inl.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,16 +1,16 @@
-// Lanes equal the model word for word: every operation of fixedpoint/lanes.h, lane_tables.h and
-// lane_quotients.h on every SIMD target, 32 and 64 bits, against the integer words of fixedpoint/words.h.
+// Lanes equal the model word for word: every operation of fixedpoint/words/lanes-inl.h, lane_tables-inl.h and
+// lane_quotients-inl.h on every SIMD target, 32 and 64 bits, against the integer words of fixedpoint/words.h.
 #include "pipeline/machines/lanes/targets.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tests/fixedpoint/lane_words_test.cpp"
 #include <hwy/foreach_target.h>
 
-#include "fixedpoint/float_lanes.h"
-#include "fixedpoint/lane_quotients.h"
-#include "fixedpoint/lane_tables.h"
 #include "fixedpoint/words.h"
-#include "pipeline/classification/entries.h"
+#include "fixedpoint/words/float_lanes-inl.h"
+#include "fixedpoint/words/lane_quotients-inl.h"
+#include "fixedpoint/words/lane_tables-inl.h"
+#include "pipeline/classification/entries-inl.h"
 
 #include <bit>
 #include <cstdio>

@@ -5,10 +5,10 @@
 #define HWY_TARGET_INCLUDE "pipeline/machines/lanes/kernels_classification.cpp"
 #include <hwy/foreach_target.h>
 
-#include "fixedpoint/float_lanes.h"
-#include "fixedpoint/lane_quotients.h"
-#include "fixedpoint/lane_tables.h"
-#include "pipeline/classification/methods.h"
+#include "fixedpoint/words/float_lanes-inl.h"
+#include "fixedpoint/words/lane_quotients-inl.h"
+#include "fixedpoint/words/lane_tables-inl.h"
+#include "pipeline/classification/methods-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -5,11 +5,11 @@
 #define HWY_TARGET_INCLUDE "pipeline/machines/lanes/kernels_compositing.cpp"
 #include <hwy/foreach_target.h>
 
-#include "fixedpoint/float_lanes.h"
-#include "fixedpoint/lanes.h"
+#include "fixedpoint/words/float_lanes-inl.h"
+#include "fixedpoint/words/lanes-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/machines/lanes/plain.h"
-#include "pipeline/stages/compositing.h"
+#include "pipeline/stages/compositing-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {

@@ -5,7 +5,7 @@
 #define HWY_TARGET_INCLUDE "pipeline/machines/lanes/kernels_projection.cpp"
 #include <hwy/foreach_target.h>
 
-#include "fixedpoint/lanes.h"
+#include "fixedpoint/words/lanes-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -5,9 +5,9 @@
 #define HWY_TARGET_INCLUDE "pipeline/machines/lanes/kernels_rays.cpp"
 #include <hwy/foreach_target.h>
 
-#include "fixedpoint/lanes.h"
+#include "fixedpoint/words/lanes-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
-#include "pipeline/stages/ray_setup.h"
+#include "pipeline/stages/ray_setup-inl.h"
 
 #include <algorithm>
 #include <bit>

@@ -5,12 +5,12 @@
 #define HWY_TARGET_INCLUDE "pipeline/machines/lanes/kernels_sampling.cpp"
 #include <hwy/foreach_target.h>
 
-#include "fixedpoint/float_lanes.h"
-#include "fixedpoint/lane_tables.h"
-#include "pipeline/classification/entries.h"
+#include "fixedpoint/words/float_lanes-inl.h"
+#include "fixedpoint/words/lane_tables-inl.h"
+#include "pipeline/classification/entries-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
-#include "pipeline/stages/interpolation.h"
-#include "pipeline/stages/location.h"
+#include "pipeline/stages/interpolation-inl.h"
+#include "pipeline/stages/location-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {

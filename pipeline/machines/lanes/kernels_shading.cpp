@@ -5,13 +5,13 @@
 #define HWY_TARGET_INCLUDE "pipeline/machines/lanes/kernels_shading.cpp"
 #include <hwy/foreach_target.h>
 
-#include "fixedpoint/float_lanes.h"
-#include "fixedpoint/lane_quotients.h"
-#include "fixedpoint/lane_tables.h"
+#include "fixedpoint/words/float_lanes-inl.h"
+#include "fixedpoint/words/lane_quotients-inl.h"
+#include "fixedpoint/words/lane_tables-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/machines/lanes/plain.h"
-#include "pipeline/stages/gradient.h"
-#include "pipeline/stages/shading.h"
+#include "pipeline/stages/gradient-inl.h"
+#include "pipeline/stages/shading-inl.h"
 
 #include <algorithm>
 #include <array>

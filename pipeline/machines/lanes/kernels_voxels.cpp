@@ -6,7 +6,7 @@
 #define HWY_TARGET_INCLUDE "pipeline/machines/lanes/kernels_voxels.cpp"
 #include <hwy/foreach_target.h>
 
-#include "fixedpoint/lane_tables.h"
+#include "fixedpoint/words/lane_tables-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 // Every classification method in fixed point, over given entries, one slab at a time.
 #pragma once
 
-#include "pipeline/classification/methods.h"
+#include "pipeline/classification/methods-inl.h"
 #include "pipeline/classification/tables/linear_entries.h"
 #include "scene/presets.h"
 

@@ -1,7 +1,7 @@
 // Lanes of the build's own SIMD target, for classification_test.cpp.
-#include "fixedpoint/lane_quotients.h"
-#include "fixedpoint/lane_tables.h"
-#include "pipeline/classification/methods.h"
+#include "fixedpoint/words/lane_quotients-inl.h"
+#include "fixedpoint/words/lane_tables-inl.h"
+#include "pipeline/classification/methods-inl.h"
 
 #include <array>
 #include <vector>

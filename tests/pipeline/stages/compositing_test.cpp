@@ -1,6 +1,6 @@
 // Stage 6's hard cases: long fogs in every form and mode, what transparency and opacity must leave alone, and
 // how far each order of compositing is from the exact sum.
-#include "pipeline/stages/compositing.h"
+#include "pipeline/stages/compositing-inl.h"
 
 #include "fixedpoint/words.h"
 

@@ -1,5 +1,5 @@
 // Stage 3's hard cases: fields whose gradient is known exactly, and what normalising must keep.
-#include "pipeline/stages/gradient.h"
+#include "pipeline/stages/gradient-inl.h"
 
 #include "fixedpoint/words.h"
 #include "scene/presets.h"

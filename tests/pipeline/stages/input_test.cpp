@@ -1,6 +1,7 @@
 // From a sample to table entries: exact where there is an entry a level, within its bound where not.
 #include "core/procedural.h"
 #include "fixedpoint/words.h"
+#include "pipeline/classification/entries-inl.h"
 #include "pipeline/plan/plan.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Stage 2's hard cases: what a lerp must keep exactly, and how far three of them are from the exact value.
-#include "pipeline/stages/interpolation.h"
+#include "pipeline/stages/interpolation-inl.h"
 
 #include "fixedpoint/words.h"
 

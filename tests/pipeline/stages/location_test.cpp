@@ -6,7 +6,7 @@
 #include "fixedpoint/words.h"
 #include "pipeline/raycast.h"
 #include "pipeline/render.h"
-#include "pipeline/stages/location.h"
+#include "pipeline/stages/location-inl.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Stage 5's hard cases: dot products at and beyond one, powers, lights that add up, and what stays dark.
-#include "pipeline/stages/shading.h"
+#include "pipeline/stages/shading-inl.h"
 
 #include "pipeline/plan/plan.h"
 

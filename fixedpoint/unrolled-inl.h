@@ -1,12 +1,13 @@
 // Loops of a few rounds written out: what they index stays in registers, which compilers do not see in time
 // of an array whose loop they unroll themselves.
-#include <hwy/highway.h>
-#if defined(SQUINT_FIXEDPOINT_UNROLLED_TARGET) == defined(HWY_TARGET_TOGGLE)
-#ifdef SQUINT_FIXEDPOINT_UNROLLED_TARGET
-#undef SQUINT_FIXEDPOINT_UNROLLED_TARGET
+#if defined(SQUINT_FIXEDPOINT_UNROLLED_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_FIXEDPOINT_UNROLLED_INL_H
+#undef SQUINT_FIXEDPOINT_UNROLLED_INL_H
 #else
-#define SQUINT_FIXEDPOINT_UNROLLED_TARGET
+#define SQUINT_FIXEDPOINT_UNROLLED_INL_H
 #endif
+
+#include <hwy/highway.h>
 
 #include <cstddef>
 

@@ -2,15 +2,15 @@
 // point with floating point.  Nothing is rounded but by float itself: a Rescale multiplies by a power of two,
 // exactly. Each operation is one of IEEE 754's, in Real's own order and without fused products, which not
 // every target has: the scalar word's bits on every CPU.
-#if defined(SQUINT_FIXEDPOINT_FLOAT_LANES_H) == defined(HWY_TARGET_TOGGLE)
-#ifdef SQUINT_FIXEDPOINT_FLOAT_LANES_H
-#undef SQUINT_FIXEDPOINT_FLOAT_LANES_H
+#if defined(SQUINT_FIXEDPOINT_WORDS_FLOAT_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_FIXEDPOINT_WORDS_FLOAT_LANES_INL_H
+#undef SQUINT_FIXEDPOINT_WORDS_FLOAT_LANES_INL_H
 #else
-#define SQUINT_FIXEDPOINT_FLOAT_LANES_H
+#define SQUINT_FIXEDPOINT_WORDS_FLOAT_LANES_INL_H
 #endif
 
-#include "fixedpoint/lane_tables.h"
-#include "fixedpoint/lanes.h"
+#include "fixedpoint/words/lane_tables-inl.h"
+#include "fixedpoint/words/lanes-inl.h"
 
 #include <bit>
 

@@ -1,19 +1,19 @@
 // The word of the fast path: as many samples side by side as a vector register holds.  All vector types and
 // target code live here; compiled once per SIMD target (Highway's foreach_target).  Only + - * / sqrt that
 // IEEE 754 rounds exactly are used in floating point, and every quotient and root is corrected in integers:
-// the same bits as the model's on every CPU.  Here: words and their arithmetic; lane_tables.h and
-// lane_quotients.h are what kernels include besides.
+// the same bits as the model's on every CPU.  Here: words and their arithmetic; lane_tables-inl.h and
+// lane_quotients-inl.h are what kernels include besides.
 //
 //   Lanes<int32_t>   products and sums of 32 bits
 //   Lanes<int64_t>   factors of 32 bits, products and sums of 64
-#if defined(SQUINT_FIXEDPOINT_LANES_H) == defined(HWY_TARGET_TOGGLE)
-#ifdef SQUINT_FIXEDPOINT_LANES_H
-#undef SQUINT_FIXEDPOINT_LANES_H
+#if defined(SQUINT_FIXEDPOINT_WORDS_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_FIXEDPOINT_WORDS_LANES_INL_H
+#undef SQUINT_FIXEDPOINT_WORDS_LANES_INL_H
 #else
-#define SQUINT_FIXEDPOINT_LANES_H
+#define SQUINT_FIXEDPOINT_WORDS_LANES_INL_H
 #endif
 
-#include "fixedpoint/unrolled.h"
+#include "fixedpoint/unrolled-inl.h"
 #include "fixedpoint/words.h"
 
 #include <hwy/highway.h>

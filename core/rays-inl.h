@@ -1,10 +1,10 @@
 // Rays of a camera and their way through a box, over a real word D: doubles one by one, or as many side by
 // side as a vector register holds.  + - * / sqrt and comparisons alone: the same bits on every CPU.
-#if defined(SQUINT_CORE_RAYS_H) == defined(HWY_TARGET_TOGGLE)
-#ifdef SQUINT_CORE_RAYS_H
-#undef SQUINT_CORE_RAYS_H
+#if defined(SQUINT_CORE_RAYS_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_CORE_RAYS_INL_H
+#undef SQUINT_CORE_RAYS_INL_H
 #else
-#define SQUINT_CORE_RAYS_H
+#define SQUINT_CORE_RAYS_INL_H
 #endif
 
 #include "core/camera.h"

@@ -1,13 +1,13 @@
 // Quotients and roots of lanes, and their wide numbers: estimates in floating point, corrected in integers,
 // so that they have the same bits as the model's on every CPU.
-#if defined(SQUINT_FIXEDPOINT_LANE_QUOTIENTS_H) == defined(HWY_TARGET_TOGGLE)
-#ifdef SQUINT_FIXEDPOINT_LANE_QUOTIENTS_H
-#undef SQUINT_FIXEDPOINT_LANE_QUOTIENTS_H
+#if defined(SQUINT_FIXEDPOINT_WORDS_LANE_QUOTIENTS_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_FIXEDPOINT_WORDS_LANE_QUOTIENTS_INL_H
+#undef SQUINT_FIXEDPOINT_WORDS_LANE_QUOTIENTS_INL_H
 #else
-#define SQUINT_FIXEDPOINT_LANE_QUOTIENTS_H
+#define SQUINT_FIXEDPOINT_WORDS_LANE_QUOTIENTS_INL_H
 #endif
 
-#include "fixedpoint/lanes.h"
+#include "fixedpoint/words/lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {

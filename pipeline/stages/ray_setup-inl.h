@@ -1,13 +1,13 @@
 // What stage 1 is given: rays in doubles, before any precision is applied, and their words.  Over a real word
-// D (core/rays.h): one ray, or as many as a vector register holds.
-#if defined(SQUINT_PIPELINE_RAY_SETUP_H) == defined(HWY_TARGET_TOGGLE)
-#ifdef SQUINT_PIPELINE_RAY_SETUP_H
-#undef SQUINT_PIPELINE_RAY_SETUP_H
+// D (core/rays-inl.h): one ray, or as many as a vector register holds.
+#if defined(SQUINT_PIPELINE_STAGES_RAY_SETUP_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_PIPELINE_STAGES_RAY_SETUP_INL_H
+#undef SQUINT_PIPELINE_STAGES_RAY_SETUP_INL_H
 #else
-#define SQUINT_PIPELINE_RAY_SETUP_H
+#define SQUINT_PIPELINE_STAGES_RAY_SETUP_INL_H
 #endif
 
-#include "core/rays.h"
+#include "core/rays-inl.h"
 #include "fixedpoint/words.h"
 #include "pipeline/plan/plan.h"
 

@@ -1,13 +1,13 @@
 // What lanes read of tables: rows, cells, and neighbours packed two a word, many addresses at once.
-#if defined(SQUINT_FIXEDPOINT_LANE_TABLES_H) == defined(HWY_TARGET_TOGGLE)
-#ifdef SQUINT_FIXEDPOINT_LANE_TABLES_H
-#undef SQUINT_FIXEDPOINT_LANE_TABLES_H
+#if defined(SQUINT_FIXEDPOINT_WORDS_LANE_TABLES_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_FIXEDPOINT_WORDS_LANE_TABLES_INL_H
+#undef SQUINT_FIXEDPOINT_WORDS_LANE_TABLES_INL_H
 #else
-#define SQUINT_FIXEDPOINT_LANE_TABLES_H
+#define SQUINT_FIXEDPOINT_WORDS_LANE_TABLES_INL_H
 #endif
 
 #include "fixedpoint/cell_table.h"
-#include "fixedpoint/lanes.h"
+#include "fixedpoint/words/lanes-inl.h"
 
 #include <cstring>
 

@@ -1,0 +1,116 @@
+// The maths of entries.h, over any word; compiled once per SIMD target.
+#if defined(SQUINT_PIPELINE_CLASSIFICATION_ENTRIES_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_PIPELINE_CLASSIFICATION_ENTRIES_INL_H
+#undef SQUINT_PIPELINE_CLASSIFICATION_ENTRIES_INL_H
+#else
+#define SQUINT_PIPELINE_CLASSIFICATION_ENTRIES_INL_H
+#endif
+
+#include "pipeline/classification/entries.h"
+
+#include "pipeline/stages/interpolation-inl.h"
+#include "pipeline/stages/location-inl.h"
+
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+
+template <class W>
+HWY_INLINE W classification_input(const InputStage& s, W sample) {
+    if (s.scaled) sample = sample * constant<W>(s.scale);
+    return clamp(quantise(sample, s.to_input), constant<W>(0), constant<W>(s.highest));
+}
+template <RealWord W>
+HWY_INLINE W classification_input(const InputStage& s, W sample) {
+    if (s.scaled) sample = sample * stage_constant<W>(s.scale, s.scale_exact, s.scale_fraction, s.active);
+    return clamp(quantise(sample, s.to_input), constant<W>(0), constant<W>(s.highest));
+}
+
+template <class W>
+HWY_INLINE W opacity_of_depth(const OpacityUnit& unit, W depth) {
+    const int fraction = unit.depth_fraction - unit.row_bits;
+    const W row = min(floor_shift(depth, fraction), constant<W>(unit.rows.rows() - 2));
+    const W rest = min(depth - shift_left(row, fraction), constant<W>(std::int64_t{1} << fraction));
+    return quantise(
+        blend(gather(unit.rows, row, 0), gather(unit.rows, row + constant<W>(1), 0), rest, fraction),
+        unit.to_alpha);
+}
+/// 1 - exp(-x) for x >= 0 in float32: -x = n ln 2 + r, |r| <= ln 2 / 2, exp(r) - 1 by its series to r^7,
+/// which is 2^-26 of r off at most.
+template <RealWord W>
+HWY_INLINE W one_minus_exp(W x) {
+    const auto k = [](double value) { return W::from(value); };
+    const W y = k(0) - min(x, k(80));  // opaque to the last bit, and 2^n in range
+    const W n = floor_shift(y * k(1.44269504088896341) + k(0.5), 0);
+    // ln 2 in two parts, the first with bits to spare for n.
+    const W r = (y - n * k(0x1.62ep-1)) - n * k(0x1.0bfbe8e7bcd5ep-15);
+    const W tail =
+        k(1.0 / 6) + r * (k(1.0 / 24) + r * (k(1.0 / 120) + r * (k(1.0 / 720) + r * k(1.0 / 5040))));
+    const W grown = r + r * r * (k(0.5) + r * tail), unit = whole_power_of_two(n);
+    return (k(1) - unit) - unit * grown;
+}
+inline Real<double> one_minus_exp(Real<double> x) {
+    return {-portable::expm1(-x.v)};
+}
+/// Without rounding: the function itself, where its result is not rounded either.
+template <RealWord W>
+HWY_INLINE W opacity_of_depth(const OpacityUnit& unit, W depth) {
+    Rescale raw = unit.to_alpha;
+    raw.shift = 0;
+    return quantise(shift_left(one_minus_exp(shift_left(depth, -unit.depth_fraction)), unit.alpha_fraction),
+                    raw);
+}
+
+/// Where an input stands between two entries.
+template <class W>
+struct EntryPosition {
+    W entry, fraction;
+};
+template <class W>
+HWY_INLINE EntryPosition<W> entry_position(const EntrySpacing& e, W input) {
+    const W entry = min(floor_shift(input, e.input_fraction), constant<W>(e.last_segment));
+    return {entry, min(input - shift_left(entry, e.input_fraction),
+                       constant<W>(std::int64_t{1} << e.input_fraction))};
+}
+
+/// One where a position is opaque: on an opaque entry, or between two (CONVENTIONS.md).
+template <class W>
+HWY_INLINE auto is_opaque(const EntryLookup& e, const EntryPosition<W>& at) {
+    const W zero = constant<W>(0), one = constant<W>(std::int64_t{1} << e.input_fraction);
+    const W here = gather(e.matter, at.entry, EntryLookup::opaque);
+    const W next = gather(e.matter, at.entry + constant<W>(1), EntryLookup::opaque);
+    const W entry_bit = here - shift_left(floor_shift(here, 1), 1),
+            next_bit = next - shift_left(floor_shift(next, 1), 1);
+    return (constant<W>(1) < here) | ((at.fraction == zero) & (zero < entry_bit)) |
+           ((at.fraction == one) & (zero < next_bit));
+}
+
+/// The function at one point, for a slab of `length` steps (post-classification; every method where both ends
+/// are equal).
+template <class W>
+HWY_INLINE Slab<W> classify_point(const EntryLookup& e, W input, W length) {
+    const EntryPosition<W> at = entry_position(e, input);
+    const W full = constant<W>(std::int64_t{1} << e.length_fraction);
+    Slab<W> slab;
+    const std::array<W, 4> between =
+        lerp_rows(e.table, at.entry, at.fraction, e.input_fraction, e.to_color, e.to_alpha);
+    slab.color = {between[0], between[1], between[2]};
+    slab.alpha = between[EntryLookup::alpha];
+    const bool may_be_opaque = e.has_opaque && any(!(slab.alpha < constant<W>(e.least_opaque)));
+    const auto shorter = length < full;
+    if (any(shorter)) {
+        const W next = gather(e.matter, at.entry + constant<W>(1), EntryLookup::extinction);
+        const W full_depth = quantise(
+            blend(gather(e.matter, at.entry, EntryLookup::extinction), next, at.fraction, e.input_fraction),
+            e.to_depth);
+        const W depth = quantise(full_depth * length, e.to_shorter);
+        slab.alpha = select(shorter, opacity_of_depth(e.opacity, depth), slab.alpha);
+    }
+    if (may_be_opaque) slab.alpha = select(is_opaque(e, at), constant<W>(e.one_alpha), slab.alpha);
+    return slab;
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif

@@ -1,0 +1,139 @@
+// The maths of gradient.h, over any word; compiled once per SIMD target.
+#if defined(SQUINT_PIPELINE_STAGES_GRADIENT_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_PIPELINE_STAGES_GRADIENT_INL_H
+#undef SQUINT_PIPELINE_STAGES_GRADIENT_INL_H
+#else
+#define SQUINT_PIPELINE_STAGES_GRADIENT_INL_H
+#endif
+
+#include "pipeline/stages/gradient.h"
+
+#include "pipeline/stages/interpolation-inl.h"
+#include "pipeline/stages/location-inl.h"
+
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+
+/// Twice the central difference along an axis at one voxel of the neighbourhood: v(+1) - v(-1).
+template <class N>
+HWY_INLINE auto central_difference(const N& n, int x, int y, int z, int axis) {
+    const int dx = axis == 0, dy = axis == 1, dz = axis == 2;
+    return n.at(x + dx, y + dy, z + dz) - n.at(x - dx, y - dy, z - dz);
+}
+
+/// 32 times the Sobel gradient along an axis at one voxel: (-1 0 1) along it, (1 2 1) across it twice.
+template <class W, class N>
+HWY_INLINE W sobel_difference(const N& n, int x, int y, int z, int axis) {
+    W sum = constant<W>(0);
+    for (int a = -1; a <= 1; ++a)
+        for (int b = -1; b <= 1; ++b) {
+            const int px = axis == 0 ? x : x + a;
+            const int py = axis == 1 ? y : y + (axis == 0 ? a : b);
+            const int pz = axis == 2 ? z : z + b;
+            const int weight = (a == 0 ? 1 : 0) + (b == 0 ? 1 : 0);  // log2 of 1, 2, 4
+            sum = sum + shift_left(central_difference(n, px, py, pz, axis), weight);
+        }
+    return sum;
+}
+
+/// Between the differences at two neighbours along x, the cell's own in row (y, z).
+template <class W, class N>
+HWY_INLINE W lerped_difference(const GradientStage& s, const N& n, int y, int z, int axis, W weight) {
+    const auto at = [&](int x) {
+        return s.rule == GradientRule::sobel ? sobel_difference<W>(n, x, y, z, axis)
+                                             : central_difference(n, x, y, z, axis);
+    };
+    return lerp(at(1), at(2), weight, s.weight_bits, s.to_first);
+}
+
+/// Differences at the cell's eight voxels, interpolated like a sample.
+template <class W, class N>
+HWY_INLINE W interpolated_difference(const GradientStage& s, const N& n, const std::array<W, 3>& weight,
+                                     int axis) {
+    const auto along_x = [&](int y, int z)
+                             SQUINT_WRITTEN_OUT { return lerped_difference(s, n, y, z, axis, weight[0]); };
+    const W z0 = lerp(along_x(1, 1), along_x(2, 1), weight[1], s.weight_bits, s.to_second);
+    const W z1 = lerp(along_x(1, 2), along_x(2, 2), weight[1], s.weight_bits, s.to_second);
+    return lerp(z0, z1, weight[2], s.weight_bits, s.to_gradient);
+}
+
+/// The exact derivative of the trilinear cell along an axis: the four edges' differences, interpolated
+/// across.
+template <class W, class N>
+HWY_INLINE W analytic_difference(const GradientStage& s, const N& n, const std::array<W, 3>& weight,
+                                 int axis) {
+    const auto corner = [&](int along, int a, int b) {
+        const int x = axis == 0 ? along : a, y = axis == 1 ? along : (axis == 0 ? a : b),
+                  z = axis == 2 ? along : b;
+        return n.at(1 + x, 1 + y, 1 + z);
+    };
+    const auto edge = [&](int a, int b) { return corner(1, a, b) - corner(0, a, b); };
+    const std::size_t first = axis == 0 ? 1 : 0, second = axis == 2 ? 1 : 2;
+    const int bits = s.weight_bits;
+    const W b0 = lerp(edge(0, 0), edge(1, 0), weight[first], bits, s.to_first);
+    const W b1 = lerp(edge(0, 1), edge(1, 1), weight[first], bits, s.to_first);
+    return lerp(b0, b1, weight[second], bits, s.to_gradient);
+}
+
+/// A component of the gradient from the voxels about a cell, by the stage's rule.
+template <class W, class N>
+HWY_INLINE W voxel_difference(const GradientStage& s, const N& n, const std::array<W, 3>& weight, int axis) {
+    return s.rule == GradientRule::analytic ? analytic_difference(s, n, weight, axis)
+                                            : interpolated_difference(s, n, weight, axis);
+}
+
+/// Samples one voxel to either side along an axis: their difference, halved (Squeeze, section 4.3).
+template <class W>
+HWY_INLINE W sample_difference(const GradientStage& s, W ahead, W behind) {
+    return quantise(ahead - behind, s.to_gradient);
+}
+
+/// A component in levels per smallest spacing.
+template <class W>
+HWY_INLINE W to_world(const GradientStage& s, W component, int axis) {
+    if (s.isotropic) return component;
+    const auto a = static_cast<std::size_t>(axis);
+    return quantise(
+        component * stage_constant<W>(s.spacing[a], s.spacing_exact[a], s.spacing_fraction, s.active),
+        s.to_scaled);
+}
+
+/// -g / |g| in s1.F, in integers.  Steps: scale so that the largest component has kNormalBits bits (floor of
+/// its magnitude), n = floor(sqrt(sum of squares) 2^kNormalGuard), then three exact quotients.  Error: 2^-14
+/// from the scaling where the gradient has more bits than that, plus half a last bit of the wire.  A zero
+/// gradient gives a zero normal.
+template <class W>
+HWY_INLINE std::array<W, 3> normalise(const GradientStage& s, const std::array<W, 3>& gradient) {
+    const W zero = constant<W>(0);
+    std::array<W, 3> size, normal;
+    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT { size[a] = absolute(gradient[a]); });
+    const W largest = max(max(size[0], size[1]), size[2]);
+    const W shift = constant<W>(kNormalBits) - bit_length(largest);
+    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+        size[a] = within(shift_by(size[a], shift), 0, (std::int64_t{1} << kNormalBits) - 1);
+    });
+    const W length = max(vector_length(size, kNormalGuard), constant<W>(1));
+    const std::array<W, 3> part = quotients(size, length, s.to_normal);
+    for_three([&](std::size_t a)
+                  SQUINT_WRITTEN_OUT { normal[a] = select(gradient[a] < zero, part[a], zero - part[a]); });
+    return normal;
+}
+
+/// Without rounding the definition itself will do.
+template <RealWord W>
+HWY_INLINE std::array<W, 3> normalise(const GradientStage& s, const std::array<W, 3>& g) {
+    const W zero = constant<W>(0), length = square_root(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+    Rescale raw = s.to_normal;
+    raw.shift = 0;
+    const W scale = W::from(-power_of_two<double>(s.normal_fraction)) / length;
+    const auto component = [&](std::size_t a) SQUINT_WRITTEN_OUT {
+        return select(zero < length, quantise(g[a] * scale, raw), zero);
+    };
+    return {component(0), component(1), component(2)};
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif

@@ -1,0 +1,48 @@
+// The maths of interpolation.h, over any word; compiled once per SIMD target.
+#if defined(SQUINT_PIPELINE_STAGES_INTERPOLATION_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_PIPELINE_STAGES_INTERPOLATION_INL_H
+#undef SQUINT_PIPELINE_STAGES_INTERPOLATION_INL_H
+#else
+#define SQUINT_PIPELINE_STAGES_INTERPOLATION_INL_H
+#endif
+
+#include "pipeline/stages/interpolation.h"
+
+#include "fixedpoint/unrolled-inl.h"
+
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+
+/// v0 + w (v1 - v0), exact until its one rounding.  A weight of one returns v1; equal corners return
+/// themselves.
+template <class W>
+HWY_INLINE W lerp(W v0, W v1, W weight, int weight_bits, const Rescale& to) {
+    return quantise(blend(v0, v1, weight, weight_bits), to);
+}
+
+/// Seven lerps: four along x, two along y, one along z.  Each level has a format of its own.  C: a Cell,
+/// however its corners are kept.
+template <class W, class C>
+HWY_INLINE W interpolate(const InterpolationStage& s, const C& cell, const std::array<W, 3>& weight) {
+    if (s.nearest) {
+        const W half = constant<W>(std::int64_t{1} << (s.weight_bits - 1));
+        const auto pick = [&](W near, W far, std::size_t axis) {
+            return select(weight[axis] < half, near, far);
+        };
+        const W y0 = pick(pick(cell.at(0), cell.at(1), 0), pick(cell.at(2), cell.at(3), 0), 1);
+        const W y1 = pick(pick(cell.at(4), cell.at(5), 0), pick(cell.at(6), cell.at(7), 0), 1);
+        return shift_left(pick(y0, y1, 2), s.sample_fraction);
+    }
+    const auto along_x = [&](int i) SQUINT_WRITTEN_OUT {  // y fastest
+        return cell.along_x(i, weight[0], s.weight_bits, s.to_x);
+    };
+    const W z0 = lerp(along_x(0), along_x(1), weight[1], s.weight_bits, s.to_y);
+    const W z1 = lerp(along_x(2), along_x(3), weight[1], s.weight_bits, s.to_y);
+    return lerp(z0, z1, weight[2], s.weight_bits, s.to_sample);
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif
