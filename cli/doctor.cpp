@@ -1,9 +1,9 @@
 // squint doctor: what this installation is made of, and whether it renders the bits it should.
 #include "cli/common.h"
+#include "core/pictures/pictures.h"
 #include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/record.h"
 
-#include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
 #include <hwy/highway.h>
 #include <tbb/version.h>
@@ -52,7 +52,7 @@ std::string targets() {
 }  // namespace
 
 int run(const DoctorArguments& a) {
-    const int oiio = OIIO::openimageio_version();
+    const int oiio = pictures::codec().version;
     const std::string model = self_test(Path::model), fast = self_test(Path::automatic);
     const bool well = model == kSelfTestHash && fast == model;
     Json json{{"schema", "squint.doctor/1"},

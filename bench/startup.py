@@ -1,0 +1,53 @@
+#!/usr/bin/env python3
+"""What a call costs before its work begins: bench/startup.py PROGRAM [--check]
+
+Prints a row a call: processor time and peak memory, medians of several runs.  With --check: exit code 1 where a call
+goes beyond its bounds."""
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+
+RUNS = 7
+SMALL = "--set volume.procedural=sphere --set volume.dims=64"  # 0.5 MB of voxels
+PICTURE = SMALL + " --size 64x48 -q -o "
+
+# A call, its bounds in ms of processor time and MB.  None: shown, not bounded.
+CALLS = [
+    ("--version", 30, 30),
+    ("--help", 30, 30),
+    ("number u1.15 0.7", 30, 30),
+    ("info SMALL.nrrd", 30, 30),
+    ("plan " + SMALL, 30, 30),
+    ("plan", None, 30),
+    ("render " + PICTURE + "OUT.exr", None, None),
+]
+
+
+def run(program, arguments, folder):
+    """-> processor time in ms, peak memory in MB."""
+    child = subprocess.Popen([program, *arguments.split()], cwd=folder, stdout=subprocess.DEVNULL,
+                             stderr=subprocess.DEVNULL)
+    _, status, usage = os.wait4(child.pid, 0)
+    if status != 0:
+        sys.exit(f"squint {arguments}: exit status {status}")
+    return 1000 * (usage.ru_utime + usage.ru_stime), usage.ru_maxrss / 1024
+
+
+def main():
+    program, check = os.path.abspath(sys.argv[1]), "--check" in sys.argv
+    failed = 0
+    with tempfile.TemporaryDirectory() as folder:
+        run(program, "volume sphere --dims 64 -o SMALL.nrrd", folder)
+        print("| call | ms of processor time | MB |\n|---|---|---|")
+        for arguments, most_ms, most_mb in CALLS:
+            runs = [run(program, arguments, folder) for _ in range(RUNS)]
+            ms, mb = (statistics.median(values) for values in zip(*runs))
+            beyond = (most_ms and ms > most_ms) or (most_mb and mb > most_mb)
+            failed += bool(beyond)
+            print(f"| `{arguments}` | {ms:.1f} | {mb:.1f} |" + (" beyond its bounds" if beyond else ""))
+    return 1 if check and failed else 0
+
+
+sys.exit(main())

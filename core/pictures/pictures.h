@@ -1,0 +1,42 @@
+// What reads and writes picture files: a module of its own, for OpenImageIO brings 250 libraries along, a quarter
+// of a second and 100 MB a start.  It is loaded when the first picture is read or written.
+#pragma once
+
+#include "core/image.h"
+
+#include <string>
+#include <vector>
+
+namespace squint::pictures {
+
+/// A picture as its file shall hold it.
+struct Packed {
+    enum class Type { u8, u32, f32 };
+    struct PackedChannel {
+        std::string name;
+        Type type;
+    };
+    const char* format;  // OpenImageIO's name: "openexr", "png"
+    int width, height;
+    std::vector<PackedChannel> channels;
+    const void* data;                                   // [row, column, channel], without gaps
+    Attributes text;                                    // stored in the file
+    std::vector<std::pair<std::string, int>> settings;  // of its encoder
+};
+
+/// What the module offers.  Its functions throw InputError, beginning with `path`.
+struct Codec {
+    int version;                                                            // of OpenImageIO: 20407 is 2.4.7
+    std::string (*encode)(const Packed& picture, const std::string& path);  // -> the file's bytes
+    Image (*read)(const std::string& path, Attributes* attributes);
+};
+
+/// The module, loaded by the first call: from beside the program in the build tree, from the library folder of an
+/// installation.  Throws InputError if it is not there.
+const Codec& codec();
+
+/// The module's one symbol: a function `const Codec* squint_picture_codec()`.
+inline constexpr const char* kFile = "libsquint_pictures.so";
+inline constexpr const char* kSymbol = "squint_picture_codec";
+
+}  // namespace squint::pictures
