@@ -119,6 +119,29 @@ S ellipsoid(const Point<S>& p, const Vec3& center, const Vec3& radii) {
         return S(-std::min(radii.x, std::min(radii.y, radii.z)));  // 0 / 0 at the centre
     return length * (length - S(1)) / sqrt(squared_length(scaled / radii));
 }
+/// Where ellipsoid() is certainly above `above` or below `-below`, without its roots and divisions: it is (|k| - 1)
+/// times a length that is at least the least radius.
+class EllipsoidBounds {
+  public:
+    EllipsoidBounds(const Vec3& center, const Vec3& radii, double above, double below)
+        : center_(center), per_radius_(1 / radii.x, 1 / radii.y, 1 / radii.z) {
+        constexpr double kRounding = 1e-9;
+        const double least = std::min(radii.x, std::min(radii.y, radii.z));
+        outer_ = (1 + above / least) * (1 + above / least) + kRounding;
+        inner_ = below < least ? (1 - below / least) * (1 - below / least) - kRounding : 0;
+    }
+    bool above(const Vec3& p) const { return squared_k(p) > outer_; }
+    bool below(const Vec3& p) const { return squared_k(p) < inner_; }
+
+  private:
+    double squared_k(const Vec3& p) const {
+        const Vec3 k = (p - center_) * per_radius_;
+        return k.dot(k);
+    }
+    Vec3 center_, per_radius_;
+    double outer_, inner_;  // of squared |k|
+};
+
 /// A tube from a to b whose radius goes from ra to rb, with round ends.
 template <class S>
 S tube(const Point<S>& p, const Vec3& a, double ra, const Vec3& b, double rb) {
@@ -139,6 +162,9 @@ struct Segment {
     double ra;
     Vec3 b;
     double rb;
+    // Farther than `reach` from the middle it reaches no surface: spare its square roots.
+    Vec3 middle = (a + b) * 0.5;
+    double reach = (b - a).length() * 0.5 + ra + 0.1;
 };
 /// Vessels of one half of the brain: a trunk, a ring around the middle, and branches that thin out.
 constexpr int kSegments = 31;
@@ -186,27 +212,34 @@ S vessels(const Point<S>& p) {
     S distance = join(ball(p, {0.24, -0.10, 0.12}, 0.055),
                       tube(p, {-0.07, -0.16, 0.12}, .018, {0.07, -0.16, 0.12}, .018), 0.01);
     for (const Segment& s : vessel_tree()) {
-        // Branches far away cannot reach the surface: spare their square roots.
-        const Vec3 middle = (s.a + s.b) * 0.5;
-        const double reach = (s.b - s.a).length() * 0.5 + s.ra + 0.1;
-        if (value_of(squared_length(half - middle)) > reach * reach) continue;
+        if (value_of(squared_length(half - s.middle)) > s.reach * s.reach) continue;
         distance = join(distance, tube(half, s.a, s.ra, s.b, s.rb), 0.008);
     }
     return distance;
 }
 
+struct Ellipsoid {
+    Vec3 center, radii;
+};
+const Ellipsoid kCranium{{0, 0.06, 0.22}, {0.62, 0.76, 0.66}}, kFace{{0, -0.32, -0.25}, {0.42, 0.42, 0.56}},
+    kEar{{0.64, 0.08, -0.02}, {0.07, 0.12, 0.17}}, kEye{{0.17, -0.70, -0.08}, {0.11, 0.06, 0.06}},
+    kMouth{{0, -0.74, -0.43}, {0.12, 0.05, 0.02}};
+template <class S>
+S ellipsoid(const Point<S>& p, const Ellipsoid& e) {
+    return ellipsoid(p, e.center, e.radii);
+}
+
 template <class S>
 S head_surface(const Point<S>& p) {
-    const S cranium = ellipsoid(p, {0, 0.06, 0.22}, {0.62, 0.76, 0.66});
-    const S face = ellipsoid(p, {0, -0.32, -0.25}, {0.42, 0.42, 0.56});
+    const S cranium = ellipsoid(p, kCranium), face = ellipsoid(p, kFace);
     const S nose = tube(p, {0, -0.72, -0.08}, .045, {0, -0.80, -0.24}, .07);
     const S neck = tube(p, {0, 0.14, -0.40}, .36, {0, 0.20, -1.5}, .36);
     Point<S> half = p;
     if (value_of(p.x) < 0) half.x = -p.x;
-    const S ear = ellipsoid(half, {0.64, 0.08, -0.02}, {0.07, 0.12, 0.17});
-    const S eye = ellipsoid(half, {0.17, -0.70, -0.08}, {0.11, 0.06, 0.06});
+    const S ear = ellipsoid(half, kEar);
+    const S eye = ellipsoid(half, kEye);
     const S head = join(join(join(join(cranium, face, 0.20), neck, 0.20), nose, 0.06), ear, 0.05);
-    const S mouth = ellipsoid(p, {0, -0.74, -0.43}, {0.12, 0.05, 0.02});
+    const S mouth = ellipsoid(p, kMouth);
     return cut(cut(head, eye, 0.05), mouth, 0.03);
 }
 
@@ -234,20 +267,46 @@ S skull_outside(const Point<S>& p) {
 constexpr double kSkin = 0.16, kTissue = 0.32, kBone = 0.55, kBrain = 0.72, kVessel = 0.94;
 constexpr double kEdge = 0.030;  // of 2: transitions are 2 voxels wide at 128, 4 at 256
 
+/// Most voxels lie where head_surface() need not be known, only that it is beyond kEdge, or below -0.06, where skin and
+/// flesh are whole.  A join lies below both its parts, at most by a quarter of its blend, a cut as much above.
+enum class Head { outside, near_the_surface, inside };
+Head part_of_head(const Vec3& p) {
+    constexpr double kOut = kEdge + (0.20 + 0.20 + 0.06 + 0.05) / 4, kIn = 0.06 + (0.05 + 0.03) / 4 + 1e-3;
+    static const auto bounds = [](const Ellipsoid& e, double above) {
+        return EllipsoidBounds(e.center, e.radii, above, kIn);
+    };
+    static const EllipsoidBounds cranium = bounds(kCranium, kOut), face = bounds(kFace, kOut),
+                                 ear = bounds(kEar, kOut), eye = bounds(kEye, kIn),
+                                 mouth = bounds(kMouth, kIn);
+    const Vec3 half(std::fabs(p.x), p.y, p.z);
+    if (cranium.below(p)) return eye.above(half) && mouth.above(p) ? Head::inside : Head::near_the_surface;
+    if (!cranium.above(p) || !face.above(p) || !ear.above(half)) return Head::near_the_surface;
+    // The nose is within a ball about its middle, the neck within a cylinder below its upper end.
+    const Vec3 nose = p - Vec3(0, -0.76, -0.16);
+    constexpr double kNose = 0.09 + 0.07 + kOut, kNeck = 0.36 + kOut;
+    const double beside = p.y - std::clamp(p.y, 0.14, 0.20);
+    const bool off_neck = p.z > -0.40 + kNeck || p.x * p.x + beside * beside > kNeck * kNeck;
+    return nose.dot(nose) > kNose * kNose && off_neck ? Head::outside : Head::near_the_surface;
+}
+
 template <class S>
 S phantom(const S& x, const S& y, const S& z) {
     const Point<S> p{x * S(2) - S(1), y * S(2) - S(1), z * S(2) - S(1)};
-    const S head = head_surface(p);
-    if (value_of(head) > kEdge) return S(0);
-    const S skin = inside(head, kEdge);
-    const S flesh = inside(head + S(0.045), kEdge);
+    const Head part = part_of_head({value_of(p.x), value_of(p.y), value_of(p.z)});
+    if (part == Head::outside) return S(0);
+    S skin(1), flesh(1);
+    if (part == Head::near_the_surface) {
+        const S head = head_surface(p);
+        if (value_of(head) > kEdge) return S(0);
+        skin = inside(head, kEdge), flesh = inside(head + S(0.045), kEdge);
+        if (value_of(head) > -0.03) return skin * S(kSkin) + flesh * S(kTissue - kSkin);
+    }
     S value = skin * S(kSkin) + flesh * S(kTissue - kSkin);
-    if (value_of(head) > -0.03) return value;
 
-    const S bone = skull_outside(p);
     // Off the middle of the vault: bone is thick at the back and the base, thin at the front and the temples.
     const S brain = ellipsoid(p, {0, 0.035, 0.235}, {0.505, 0.625, 0.535});
-    const S within_skull = inside(join(bone, brain, 1e-3), kEdge);
+    const bool deep = value_of(brain) < -kEdge;  // within the skull wherever its outside is
+    const S within_skull = deep ? S(1) : inside(join(skull_outside(p), brain, 1e-3), kEdge);
     value = value + within_skull * S(kBone - kTissue);
     if (value_of(brain) > kEdge) return value;
     value = value + inside(brain, kEdge) * S(kBrain - kBone);

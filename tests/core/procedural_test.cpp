@@ -133,6 +133,12 @@ TEST(Procedural, IsTheSameVolumeEveryTime) {
     EXPECT_NE(a.content_hash, make_procedural(named("phantom"), {32, 32, 32}, 11).content_hash);
 }
 
+// The hash is of the voxels of the whole formula, before it was spared where its value is known.
+TEST(Procedural, ThePhantomIsThatOfItsWholeFormula) {
+    EXPECT_EQ(make_procedural(named("phantom"), {97, 97, 97}, 16).content_hash,
+              "c1d507e5a443376d75822e9cd0c4ed05");
+}
+
 TEST(Procedural, RefusesBitsSizesAndSpacingsThatCannotBe) {
     EXPECT_THROW(make_procedural(named("ramp"), {2, 2, 2}, 17), InputError);
     EXPECT_THROW(make_procedural(named("ramp"), {2, 0, 2}, 8), InputError);
