@@ -1,6 +1,8 @@
 #include "pipeline/machines/model.h"
 
-#include "pipeline/raycast.h"
+#include "pipeline/machines/aovs.h"
+#include "pipeline/slab-inl.h"
+#include "pipeline/stages/ray_setup-inl.h"
 
 #include <cmath>
 #include <limits>
@@ -62,6 +64,38 @@ void store(const Plan& plan, const Pixel<W>& pixel, int column, int row, Image& 
     }
 }
 
+// Notes depths and the first normal of a ray where a picture asks for them.
+template <class W>
+class Aovs : public Silent {
+  public:
+    Aovs(const Plan& plan, double entry_distance, Pixel<W>& pixel)
+        : plan_(plan),
+          entry_distance_(entry_distance),
+          pixel_(pixel),
+          backwards_(plan.compositing.form == CompositingForm::back_to_front) {}
+
+    void slab(W k) { k_ = k; }
+    void lit(const std::array<W, 3>& normal) {
+        if (!met_ || backwards_) pixel_.first_normal = normal;
+        met_ = true;
+    }
+    void composited(const Slab<W>& slab, const Accumulated<W>& before, const Accumulated<W>& after) const {
+        if (!plan_.wants_depth || plan_.projection_mode || !(constant<W>(0) < slab.alpha)) return;
+        const auto clear = [&](const Accumulated<W>& a) {
+            return to_double(transparency(plan_.compositing, a));
+        };
+        note_depth(entry_distance_ + to_double(k_) * plan_.step_world, clear(before), clear(after),
+                   backwards_, pixel_);
+    }
+
+  private:
+    const Plan& plan_;
+    double entry_distance_;
+    Pixel<W>& pixel_;
+    bool backwards_, met_ = false;
+    W k_{};
+};
+
 template <class W>
 void cast_tile(const Plan& plan, int left, int top, int right, int bottom, Image& image,
                TileStatistics& statistics) {
@@ -69,7 +103,10 @@ void cast_tile(const Plan& plan, int left, int top, int right, int bottom, Image
         for (int row = top; row < bottom; ++row)
             for (int column = left; column < right; ++column) {
                 const RaySetup ray = plan.set_up(column, row);
-                const Pixel<W> pixel = cast_ray<W>(plan, method, ray);
+                Pixel<W> pixel;
+                Aovs<W> aovs(plan, ray.entry_distance, pixel);
+                cast_ray(plan, method, FromVolume{*plan.volume}, ray_words<W>(plan, ray), ray.slabs, aovs,
+                         pixel);
                 store(plan, pixel, column, row, image);
                 statistics.rays += ray.slabs > 0;
                 statistics.samples += pixel.samples, statistics.visited += pixel.samples;
@@ -88,13 +125,21 @@ void store_pixel(const Plan& plan, const Pixel<Real<float>>& pixel, int column, 
 
 Pixel<std::int64_t> project_pixel(const Plan& plan, std::int64_t scalar, std::int64_t slabs) {
     return with_method(plan, [&](const auto& method) {
-        if (plan.word_bits == 64) return projected<std::int64_t>(plan, method, scalar, slabs);
-        const Pixel<Int128> wide = projected<Int128>(plan, method, scalar, slabs);
+        const auto in_words = [&]<class W>(W word) {
+            const Silent silent;
+            return projected(plan, method, word, constant<W>(slabs), nothing_yet<W>(plan.compositing),
+                             silent);
+        };
         Pixel<std::int64_t> pixel;
-        for (std::size_t c = 0; c < 3; ++c)
-            pixel.gathered.color[c] = static_cast<std::int64_t>(wide.gathered.color[c]);
-        pixel.gathered.transparency = static_cast<std::int64_t>(wide.gathered.transparency);
-        pixel.samples = wide.samples;
+        pixel.samples = slabs;
+        if (plan.word_bits == 64) {
+            pixel.gathered = in_words(scalar);
+        } else {
+            const Accumulated<Int128> wide = in_words(Int128{scalar});
+            for (std::size_t c = 0; c < 3; ++c)
+                pixel.gathered.color[c] = static_cast<std::int64_t>(wide.color[c]);
+            pixel.gathered.transparency = static_cast<std::int64_t>(wide.transparency);
+        }
         return pixel;
     });
 }
@@ -125,15 +170,19 @@ std::string ModelRenderer::why() const {
 
 namespace {
 // Moves what the wires have collected so far to the slab it belongs to.
-struct Collector {
-    std::vector<TraceEvent>& fresh;
-    RayTrace& trace;
-    std::int64_t current = -1;
-    void slab(std::int64_t k) { flush(), current = k; }
+class Collector : public Silent {
+  public:
+    Collector(std::vector<TraceEvent>& fresh, RayTrace& trace) : fresh_(fresh), trace_(trace) {}
+    void slab(Audited k) { flush(), current_ = to_index(k); }
     void flush() {
-        for (const TraceEvent& e : fresh) trace.events.push_back({current, e});
-        fresh.clear();
+        for (const TraceEvent& e : fresh_) trace_.events.push_back({current_, e});
+        fresh_.clear();
     }
+
+  private:
+    std::vector<TraceEvent>& fresh_;
+    RayTrace& trace_;
+    std::int64_t current_ = -1;
 };
 }  // namespace
 
@@ -145,9 +194,11 @@ RayTrace trace_ray(const Plan& plan, int column, int row) {
     std::vector<TraceEvent> fresh;
     for (WireStatistics& s : statistics) s.trace = &fresh;
     attach_statistics(traced, statistics);
-    Collector collector{fresh, trace};
+    Collector collector(fresh, trace);
     with_method(traced, [&](const auto& method) {
-        const auto pixel = cast_ray<Audited>(traced, method, trace.setup, collector);
+        Pixel<Audited> pixel;
+        cast_ray(traced, method, FromVolume{*traced.volume}, ray_words<Audited>(traced, trace.setup),
+                 trace.setup.slabs, collector, pixel);
         trace.color = color_of(traced.compositing, in_doubles(pixel.gathered));
     });
     collector.flush();

@@ -1,29 +1,53 @@
 #include "pipeline/plan/ranges.h"
 
 #include "core/error.h"
-#include "pipeline/classification/methods-inl.h"
-#include "pipeline/stages/compositing-inl.h"
-#include "pipeline/stages/gradient-inl.h"
-#include "pipeline/stages/interpolation-inl.h"
-#include "pipeline/stages/location-inl.h"
-#include "pipeline/stages/shading-inl.h"
+#include "pipeline/slab-inl.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 namespace squint {
 namespace {
 
 using namespace HWY_NAMESPACE;
 
-// Runs one stage over ranges and gives the widths it met.
-template <class F>
-WordNeeds needs_of(F&& run) {
-    Range::needs = {};
-    run();
-    return Range::needs;
-}
+// Keeps what the composition needs, part by part, and the slab that it composited.
+class Ledger : public Silent {
+  public:
+    std::array<WordNeeds, kParts> needs;
+    Slab<Range> last{};  // composited
+
+    Ledger() { Range::needs = {}; }
+    void at(Part part) {
+        close();
+        part_ = part;
+    }
+    void close() {
+        if (part_) needs[static_cast<std::size_t>(*part_)].merge(Range::needs);
+        Range::needs = {};
+    }
+    void composited(const Slab<Range>& s, const Accumulated<Range>&, const Accumulated<Range>&) { last = s; }
+
+  private:
+    std::optional<Part> part_;
+};
+
+// Anything that a volume holds, wherever it is.
+struct AnyVoxel {
+    Range voxel;
+    Cell<Range> cell(const std::array<Range, 3>&) const {
+        Cell<Range> cell;
+        cell.corner.fill(voxel);
+        return cell;
+    }
+    Neighbourhood<Range> neighbourhood(const std::array<Range, 3>&) const {
+        Neighbourhood<Range> near;
+        near.voxel.fill(voxel);
+        return near;
+    }
+};
 
 Range up_to(std::int64_t high) {
     return {0, high};
@@ -67,10 +91,7 @@ void leave_out_proven_limits(Plan& plan, const Slab<Range>& slab) {
 }  // namespace
 
 void choose_words(Plan& plan) {
-    const Volume& v = *plan.volume;
-    const Range voxel{v.smallest, v.largest};
-    const auto whole_steps = static_cast<std::int64_t>(most_steps(plan)) + 2;
-    std::array<WordNeeds, 6> needs;
+    const auto most_slabs = static_cast<std::int64_t>(most_steps(plan)) + 2;
     Range::limited = 0;
 
     RayWords<Range> ray{};
@@ -80,57 +101,35 @@ void choose_words(Plan& plan) {
         ray.view[a] = format_range(plan.shading.light_spec.format);
         for (auto& half : ray.half) half[a] = format_range(plan.shading.light_spec.format);
     }
-    ray.last_index = up_to(whole_steps), ray.last_length = up_to(plan.specs[Wire::length].format.one());
+    ray.last_index = up_to(most_slabs), ray.last_length = up_to(plan.specs[Wire::length].format.one());
 
-    std::array<Range, 3> location;
-    CellPosition<Range> position;
-    needs[0] = needs_of([&] {
-        for (int a = 0; a < 3; ++a)
-            location[static_cast<std::size_t>(a)] = locate(plan.location, ray, up_to(whole_steps), a);
-        position = cell_position(plan.location, location);
-        for (Range& w : position.weight) w = within(w, 0, std::int64_t{1} << plan.interpolation.weight_bits);
-    });
-    Range sample, input;
-    needs[1] = needs_of([&] {
-        Cell<Range> cell;
-        cell.corner.fill(voxel);
-        sample = interpolate(plan.interpolation, cell, position.weight);
-    });
-    plan.input_needs = needs_of([&] { input = classification_input(plan.input, sample); });
-    std::array<Range, 3> normal{};
-    if (plan.lit) {
-        std::array<Range, 3> gradient;
-        plan.gradient_needs = needs_of([&] {
-            Neighbourhood<Range> near;
-            near.voxel.fill(voxel);
-            for (int axis = 0; axis < 3; ++axis) {
-                Range& g = gradient[static_cast<std::size_t>(axis)];
-                g = plan.gradient.rule == GradientRule::central_samples
-                        ? sample_difference(plan.gradient, sample, sample)
-                        : voxel_difference(plan.gradient, near, position.weight, axis);
-                g = to_world(plan.gradient, g, axis);
-                if (plan.needs_back) g = g + g;
+    // Any slab of any ray, onto whatever the slabs before it have left.
+    Ledger ledger;
+    const AnyVoxel voxels{{plan.volume->smallest, plan.volume->largest}};
+    std::visit(
+        [&](const auto& method) {
+            Slabs slabs(plan, method, voxels, ray, up_to(most_slabs), ledger);
+            slabs.pixel.transparency = up_to(plan.compositing.unit());
+            for (Range& c : slabs.pixel.color) c = format_range(plan.specs[Wire::color].format);
+            if (!plan.projection_mode) {
+                slabs.step(up_to(most_slabs - 1));
+                return;
             }
-        });
-        plan.normal_needs = needs_of([&] { normal = normalise(plan.gradient, gradient); });
-        needs[2] = plan.gradient_needs;
-        needs[2].merge(plan.normal_needs);
-    }
-    Slab<Range> slab;
-    needs[3] = needs_of([&] {
-        if (plan.scene.compositing.mode == CompositingMode::average && plan.projection_mode)
-            input = input + quotient(input * up_to(whole_steps), up_to(whole_steps), plan.to_average);
-        input = within(input, 0, plan.input.highest);
-        slab = std::visit([&](const auto& m) { return classify(m, input, input, ray.last_length); },
-                          plan.method);
-    });
-    if (plan.lit) needs[4] = needs_of([&] { shade(plan.shading, ray, normal, slab.alpha, slab.color); });
-    needs[5] = needs_of([&] {
-        Accumulated<Range> pixel = nothing_yet<Range>(plan.compositing);
-        pixel.transparency = up_to(plan.compositing.unit());
-        for (Range& c : pixel.color) c = format_range(plan.specs[Wire::color].format);
-        composite(plan.compositing, pixel, slab.color, slab.alpha);
-    });
+            Range scalar = slabs.sample(up_to(most_slabs)).input;
+            ledger.at(Part::classification);
+            if (plan.scene.compositing.mode == CompositingMode::average)
+                scalar = noted({0, scalar.high * most_slabs});  // a sum of so many
+            slabs.project(scalar, up_to(most_slabs));
+        },
+        plan.method);
+    ledger.close();
+    const auto needs_of = [&](Part part) { return ledger.needs[static_cast<std::size_t>(part)]; };
+    plan.input_needs = needs_of(Part::input);
+    plan.gradient_needs = needs_of(Part::gradient), plan.normal_needs = needs_of(Part::normal);
+    std::array<WordNeeds, 6> needs;
+    for (int part = 0; part < kParts; ++part)
+        if (const auto p = static_cast<Part>(part); p != Part::input)
+            needs[stage_index(p)].merge(needs_of(p));
 
     WordNeeds all = plan.input_needs;
     for (std::size_t i = 0; i < 6; ++i) {
@@ -144,7 +143,7 @@ void choose_words(Plan& plan) {
     }
     plan.word_bits = all.result_bits <= 63 ? 64 : 128;
     visit_stages(plan, LeaveOutLimits{Range::limited});
-    leave_out_proven_limits(plan, slab);
+    leave_out_proven_limits(plan, ledger.last);
 }
 
 }  // namespace squint

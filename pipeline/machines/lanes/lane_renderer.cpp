@@ -2,7 +2,6 @@
 
 #include "pipeline/machines/lanes/packet_loop.h"
 #include "pipeline/machines/lanes/targets.h"
-#include "pipeline/raycast.h"
 
 #include <fmt/format.h>
 #include <unistd.h>

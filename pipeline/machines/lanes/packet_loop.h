@@ -1,10 +1,11 @@
 // One packet of 16 rays, batch after batch through the stages' kernels.  For lane_renderer.cpp alone.
 #pragma once
 
+#include "pipeline/machines/aovs.h"
 #include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/machines/lanes/packet.h"
 #include "pipeline/machines/model.h"
-#include "pipeline/raycast.h"
+#include "pipeline/stages/compositing-inl.h"
 
 #include <algorithm>
 #include <bit>
@@ -271,8 +272,9 @@ class PacketLoop {
             const int row = backwards_ ? taken - 1 - i : i;
             if (here().alpha.v[row * kRays + r] <= 0) continue;
             const std::int64_t front = transparency_at(row), back = transparency_at(row + 1);
-            note_depth(plan_, w_.rays.entry_distance[r], here().first + row, backwards_ ? back : front,
-                       backwards_ ? front : back, backwards_, w_.notes.pixel[r]);
+            note_depth(w_.rays.entry_distance[r] + (here().first + row) * plan_.step_world,
+                       to_double(backwards_ ? back : front), to_double(backwards_ ? front : back), backwards_,
+                       w_.notes.pixel[r]);
         }
     }
 

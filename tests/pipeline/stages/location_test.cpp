@@ -4,9 +4,9 @@
 
 #include "core/procedural.h"
 #include "fixedpoint/words.h"
-#include "pipeline/raycast.h"
 #include "pipeline/render.h"
 #include "pipeline/stages/location-inl.h"
+#include "pipeline/stages/ray_setup-inl.h"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,24 @@
+// Depths and normals of a picture: heard by an observer of the composition, or found beside lanes.
+#pragma once
+
+#include "pipeline/plan/plan.h"
+#include "pipeline/slab.h"
+
+namespace squint {
+
+/// Adds a visible slab to a pixel's depths.  `z`: its front's distance from the ray's origin, world units;
+/// `before`, `after`: T in front of it and behind it, in one unit.
+template <class W>
+void note_depth(double z, double before, double after, bool backwards, Pixel<W>& pixel) {
+    if (backwards) {
+        const double clear = before > 0 ? after / before : 1;
+        pixel.weighted_distance = pixel.weighted_distance * clear + z * (1 - clear);
+        pixel.weight = pixel.weight * clear + (1 - clear);
+    } else {
+        pixel.weighted_distance += z * (before - after);
+        pixel.weight += before - after;
+    }
+    if (!pixel.first_hit || backwards) pixel.first_hit = z;
+}
+
+}  // namespace squint

@@ -1,0 +1,264 @@
+// The composition of the stages: the only place where their order stands.
+//
+//     volume -> location -> interpolation -> gradient -> classification -> shading -> compositing -> pixel
+//
+// A template over the word, the classification, the source of voxels and an observer.  Who runs it is a
+// machine: the golden model, its audit and traces (machines/model.cpp), intervals (plan/ranges.cpp), tallies of
+// hardware (studies).  A machine that branches on a comparison asks any(): intervals take both ways.
+// Compiled once per SIMD target.
+#if defined(SQUINT_PIPELINE_SLAB_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_PIPELINE_SLAB_INL_H
+#undef SQUINT_PIPELINE_SLAB_INL_H
+#else
+#define SQUINT_PIPELINE_SLAB_INL_H
+#endif
+
+#include "pipeline/slab.h"
+
+#include "pipeline/classification/methods-inl.h"
+#include "pipeline/plan/plan.h"
+#include "pipeline/stages/compositing-inl.h"
+#include "pipeline/stages/gradient-inl.h"
+#include "pipeline/stages/interpolation-inl.h"
+#include "pipeline/stages/location-inl.h"
+#include "pipeline/stages/shading-inl.h"
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <array>
+
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+
+/// Voxels of a volume.  Fetching is apart from arithmetic: stages receive voxels, they do not index the
+/// volume.
+struct FromVolume {
+    const Volume& volume;
+
+    template <class W>
+    Cell<W> cell(const std::array<W, 3>& at) const {
+        const Index3 p(to_index(at[0]), to_index(at[1]), to_index(at[2]));
+        Cell<W> corners;
+        for (int i = 0; i < 8; ++i)
+            corners.corner[static_cast<std::size_t>(i)] = constant<W>(volume.at(
+                std::min(p.x + (i & 1), volume.dims.x - 1), std::min(p.y + (i >> 1 & 1), volume.dims.y - 1),
+                std::min(p.z + (i >> 2), volume.dims.z - 1)));
+        return corners;
+    }
+    template <class W>
+    Neighbourhood<W> neighbourhood(const std::array<W, 3>& at) const {
+        const Index3 p(to_index(at[0]), to_index(at[1]), to_index(at[2]));
+        const auto inside = [](std::int64_t i, std::int64_t n) {
+            return std::clamp<std::int64_t>(i, 0, n - 1);
+        };
+        Neighbourhood<W> n;
+        for (int i = 0; i < 64; ++i)
+            n.voxel[static_cast<std::size_t>(i)] = constant<W>(volume.at(
+                inside(p.x + (i & 3) - 1, volume.dims.x), inside(p.y + (i >> 2 & 3) - 1, volume.dims.y),
+                inside(p.z + (i >> 4) - 1, volume.dims.z)));
+        return n;
+    }
+};
+
+/// MIP, MinIP, average: one scalar of what a ray has met so far and its next sample.
+template <class W>
+HWY_INLINE W merge_samples(CompositingMode mode, W kept, W next) {
+    return mode == CompositingMode::mip     ? max(kept, next)
+           : mode == CompositingMode::minip ? min(kept, next)
+                                            : kept + next;
+}
+
+/// The end of a projection: the extreme or the sum of a ray's `slabs` samples is classified and composited as
+/// one.
+template <class W, class M, class Observer>
+Accumulated<W> projected(const Plan& plan, const M& method, W scalar, W slabs, Accumulated<W> pixel,
+                         Observer& observer) {
+    observer.at(Part::classification);
+    if (plan.scene.compositing.mode == CompositingMode::average)
+        scalar = within(quotient(scalar, slabs, plan.to_average), 0, plan.input.highest);
+    const Slab<W> slab =
+        classify(method, scalar, scalar, constant<W>(std::int64_t{1} << plan.location.length_fraction));
+    observer.at(Part::compositing);
+    const Accumulated<W> before = pixel;
+    composite(plan.compositing, pixel, slab.color, slab.alpha);
+    observer.composited(slab, before, pixel);
+    return pixel;
+}
+
+/// The slabs of one ray, one after the other, through every stage onto its pixel.  `slabs`: their number.
+template <class W, class M, class Voxels, class Observer = const Silent>
+class Slabs {
+  public:
+    Accumulated<W> pixel;  // what the ray has gathered so far
+
+    Slabs(const Plan& plan, const M& method, const Voxels& voxels, const RayWords<W>& ray, W slabs,
+          Observer& observer)
+        : pixel(nothing_yet<W>(plan.compositing)),
+          plan_(plan),
+          method_(method),
+          voxels_(voxels),
+          ray_(ray),
+          observer_(observer),
+          last_(slabs - constant<W>(1)),
+          backwards_(plan.compositing.form == CompositingForm::back_to_front) {}
+
+    /// Slab k.  A ray's slabs come in order, backwards ones from the last: of neighbours that need both ends
+    /// the sample between them is computed once.
+    HWY_INLINE void step(W k) {
+        observer_.slab(k);
+        take_samples(k);
+        const W full = constant<W>(std::int64_t{1} << plan_.location.length_fraction);
+        composite_slab(front_, back(), select(k == last_, ray_.last_length, full));
+    }
+
+    /// Whether slabs behind this one can be seen.
+    HWY_INLINE auto goes_on() const { return HWY_NAMESPACE::goes_on(plan_.compositing, pixel); }
+
+    /// Stages 1 and 2: sample k of the ray.
+    HWY_INLINE Sample<W> sample(W k) const {
+        observer_.at(Part::location);
+        return sample_at({locate(plan_.location, ray_, k, 0), locate(plan_.location, ray_, k, 1),
+                          locate(plan_.location, ray_, k, 2)});
+    }
+
+    /// A projection's end.
+    void project(W scalar, W slabs) { pixel = projected(plan_, method_, scalar, slabs, pixel, observer_); }
+
+  private:
+    HWY_INLINE void take_samples(W k) {
+        observer_.at(Part::location);
+        if constexpr (!M::kNeedsBack) {
+            front_ = sample(k);
+        } else if (backwards_) {
+            back_ = carries_ ? front_ : sample(k + constant<W>(1));
+            front_ = sample(k);
+        } else {
+            front_ = carries_ ? back_ : sample(k);
+            back_ = sample(k + constant<W>(1));
+        }
+        carries_ = true;
+    }
+    HWY_INLINE const Sample<W>& back() const { return M::kNeedsBack ? back_ : front_; }
+
+    // Stages 4, 3 and 5, 6: one slab between two samples, or a part of one.
+    HWY_INLINE void composite_slab(const Sample<W>& front, const Sample<W>& back, W length) {
+        observer_.at(Part::classification);
+        Slab<W> slab = classify(method_, front.input, back.input, length);
+        if (plan_.lit && any(constant<W>(0) < slab.alpha)) light(front, back, slab);
+        observer_.at(Part::compositing);
+        const Accumulated<W> before = pixel;
+        composite(plan_.compositing, pixel, slab.color, slab.alpha);
+        observer_.composited(slab, before, pixel);
+    }
+
+    // Stages 3 and 5: what is seen of a slab, lit.
+    HWY_INLINE void light(const Sample<W>& front, const Sample<W>& back, Slab<W>& slab) const {
+        const std::array<W, 3> normal = slab_normal(front, back);
+        observer_.lit(normal);
+        observer_.at(Part::shading);
+        shade(plan_.shading, ray_, normal, slab.alpha, slab.color);
+    }
+
+    // The normal that lights a slab: of its sample, or of the mean of its two ends' gradients.
+    HWY_INLINE std::array<W, 3> slab_normal(const Sample<W>& front, const Sample<W>& back) const {
+        std::array<W, 3> gradient = gradient_at(front);
+        if constexpr (M::kNeedsBack) {
+            const std::array<W, 3> other = gradient_at(back);
+            observer_.at(Part::gradient);
+            for (std::size_t a = 0; a < 3; ++a) gradient[a] = gradient[a] + other[a];
+        }
+        observer_.at(Part::normal);
+        return normalise(plan_.gradient, gradient);
+    }
+
+    // Stage 2 at a location.
+    HWY_INLINE Sample<W> sample_at(const std::array<W, 3>& location) const {
+        Sample<W> sample = scalar_at(location);
+        observer_.at(Part::input);
+        sample.input = classification_input(plan_.input, sample.scalar);
+        return sample;
+    }
+    HWY_INLINE Sample<W> scalar_at(const std::array<W, 3>& location) const {
+        Sample<W> sample;
+        sample.location = location;
+        sample.position = cell_position(plan_.location, location);
+        // A part of a cell: what its meaning says and intervals do not see.
+        for (W& w : sample.position.weight)
+            w = within(w, 0, std::int64_t{1} << plan_.interpolation.weight_bits);
+        observer_.at(Part::interpolation);
+        sample.scalar =
+            interpolate(plan_.interpolation, voxels_.cell(sample.position.cell), sample.position.weight);
+        return sample;
+    }
+
+    // Stage 3 at a sample: the raw gradient, per smallest voxel spacing.
+    HWY_INLINE std::array<W, 3> gradient_at(const Sample<W>& sample) const {
+        const GradientStage& s = plan_.gradient;
+        std::array<W, 3> gradient;
+        Neighbourhood<W> near;
+        if (s.rule != GradientRule::central_samples) near = voxels_.neighbourhood(sample.position.cell);
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto a = static_cast<std::size_t>(axis);
+            W component;
+            if (s.rule == GradientRule::central_samples) {
+                const W ahead = scalar_beside(sample, axis, true),
+                        behind = scalar_beside(sample, axis, false);
+                observer_.at(Part::gradient);
+                component = sample_difference(s, ahead, behind);
+            } else {
+                observer_.at(Part::gradient);
+                component = voxel_difference(s, near, sample.position.weight, axis);
+            }
+            gradient[a] = to_world(s, component, axis);
+        }
+        return gradient;
+    }
+    HWY_INLINE W scalar_beside(const Sample<W>& sample, int axis, bool ahead) const {
+        observer_.at(Part::location);
+        std::array<W, 3> location = sample.location;
+        const auto a = static_cast<std::size_t>(axis);
+        location[a] = beside(plan_.location, location[a], axis, ahead);
+        return scalar_at(location).scalar;
+    }
+
+    const Plan& plan_;
+    const M& method_;
+    const Voxels& voxels_;
+    const RayWords<W>& ray_;
+    Observer& observer_;
+    W last_;
+    bool backwards_;
+    bool carries_ = false;  // the last slab's samples stand in front_ and back_
+    Sample<W> front_, back_;
+};
+
+/// A ray of `count` slabs through the volume onto its pixel; ends where nothing behind can be seen.
+template <class W, class M, class Voxels, class Observer>
+void cast_ray(const Plan& plan, const M& method, const Voxels& voxels, const RayWords<W>& ray,
+              std::int64_t count, Observer& observer, Pixel<W>& pixel) {
+    Slabs<W, M, Voxels, Observer> slabs(plan, method, voxels, ray, constant<W>(count), observer);
+    pixel.samples = 0;
+    if (plan.projection_mode) {
+        if (count > 0) {
+            W scalar = slabs.sample(constant<W>(0)).input;
+            for (std::int64_t k = 1; k < count; ++k)
+                scalar =
+                    merge_samples(plan.scene.compositing.mode, scalar, slabs.sample(constant<W>(k)).input);
+            slabs.project(scalar, constant<W>(count));
+        }
+        pixel.samples = count;
+    } else {
+        const bool backwards = plan.compositing.form == CompositingForm::back_to_front;
+        for (std::int64_t i = 0; i < count; ++i) {
+            slabs.step(constant<W>(backwards ? count - 1 - i : i));
+            ++pixel.samples;
+            if (!backwards && !slabs.goes_on()) break;
+        }
+    }
+    pixel.gathered = slabs.pixel;
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif
