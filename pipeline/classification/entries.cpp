@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/portable_math.h"
+#include "pipeline/stages/inputs.h"
 
 #include <fmt/format.h>
 
@@ -26,6 +27,27 @@ double decoded_alpha(double alpha, const Spec& spec, AlphaEncoding encoding) {
 }
 
 }  // namespace
+
+InputStage build_input(const StageInputs& in) {
+    require_integer_bits(
+        in, Wire::classification_input, bits_for(in.entries.coordinate(in.volume.largest)),
+        fmt::format("entry {} of the transfer function", in.entries.coordinate(in.volume.largest)));
+    InputStage s;
+    s.scaled = in.entries.scalars_per_entry != 1;
+    s.scale_exact = 1 / in.entries.scalars_per_entry;
+    // Entries per level with 20 significant bits.
+    s.scale_fraction = s.scaled ? std::clamp(20 - bits_for(s.scale_exact) +
+                                                 std::max(0, bits_for(in.entries.scalars_per_entry) - 1),
+                                             0, 36)
+                                : 0;
+    s.scale =
+        s.scaled
+            ? static_cast<std::int64_t>(std::floor(s.scale_exact * std::ldexp(1.0, s.scale_fraction) + 0.5))
+            : 1;
+    s.to_input = rescale(in, fraction(in, Wire::sample) + s.scale_fraction, Wire::classification_input);
+    s.highest = static_cast<std::int64_t>(in.entries.size() - 1) << fraction(in, Wire::classification_input);
+    return s;
+}
 
 void require_range(const WireSpecs& specs, Wire wire, double largest, const char* what) {
     const Format& f = specs[wire].format;

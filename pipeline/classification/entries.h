@@ -14,6 +14,8 @@
 
 namespace squint {
 
+struct StageInputs;
+
 struct TableReport {
     std::string name;
     std::int64_t rows = 0, columns = 0, bytes = 0;
@@ -63,6 +65,8 @@ struct InputStage {
         v(to_input);
     }
 };
+/// The stage's constants.  Throws InputError where its wire cannot hold the last entry.
+InputStage build_input(const StageInputs& in);
 
 /// Where entries stand among inputs.
 struct EntrySpacing {

@@ -1,10 +1,11 @@
 // Stage 6: compositing.  slab colour and opacity (1.F) -> pixel C and T (1.F).  Squeeze, sections 3 and 4.1.
 //
-//     w            w = q(alpha T);  T -= w;  C += c w        the default: C + T = 1 for white, one multiply
-//     fewer equation_9   C += C_s T;  T = q(T (1 - alpha))         Squeeze, equation 9 alpha        C += C_s
-//     (1 - A);  A += q((1 - A) alpha)  front to back with opacity back_to_front  C = C_s + q(C (1 - alpha))
-//     Squeeze, equation 6 unit255_*    1.0 is 2^F - 1: a bare shift loses one in 256 at every product,
-//     Blinn's multiply (equation 1) does not
+//     w               w = q(alpha T);  T -= w;  C += c w       the default: C + T = 1 for white, one multiply fewer
+//     equation_9      C += C_s T;  T = q(T (1 - alpha))        Squeeze, equation 9
+//     alpha           C += C_s (1 - A);  A += q((1 - A) alpha) front to back with opacity
+//     back_to_front   C = C_s + q(C (1 - alpha))               Squeeze, equation 6
+//     unit255_*       1.0 is 2^F - 1: a bare shift loses one in 256 at every product, Blinn's multiply
+//                     (equation 1) does not
 #pragma once
 
 #include "fixedpoint/words.h"
@@ -14,6 +15,8 @@
 #include <array>
 
 namespace squint {
+
+struct StageInputs;
 
 struct CompositingStage {
     CompositingForm form = CompositingForm::w;
@@ -42,6 +45,11 @@ struct CompositingStage {
     std::int64_t unit() const { return (std::int64_t{1} << transparency_fraction) - (is_unit255() ? 1 : 0); }
     std::int64_t color_unit() const { return is_unit255() ? unit() : std::int64_t{1} << sum_fraction; }
 };
+/// The stage's constants.  Throws InputError where the transparency's wire cannot hold one.
+CompositingStage build_compositing(const StageInputs& in);
+
+/// The form that a scene is composited by: its own, or its preset's.
+CompositingForm form_of(const Scene& scene);
 
 /// What a pixel has gathered so far.  T holds alpha in the alpha form.
 template <class W>

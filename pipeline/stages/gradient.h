@@ -11,6 +11,8 @@
 
 namespace squint {
 
+struct StageInputs;
+
 struct GradientStage {
     GradientRule rule = GradientRule::central;
     int weight_bits = 0;
@@ -31,6 +33,8 @@ struct GradientStage {
         v(to_first), v(to_second), v(to_gradient), v(to_scaled), v(to_normal);
     }
 };
+/// The stage's constants.  Throws InputError where a wire is unsigned and the scene is lit.
+GradientStage build_gradient(const StageInputs& in);
 
 /// Bits that normalising keeps of the largest component, and fraction bits it gives the length.
 inline constexpr int kNormalBits = 15, kNormalGuard = 8;

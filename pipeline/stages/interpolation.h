@@ -8,6 +8,8 @@
 
 namespace squint {
 
+struct StageInputs;
+
 struct InterpolationStage {
     int weight_bits = 0;  // fraction bits of a weight: one is 1 << weight_bits
     Rescale to_x, to_y, to_sample;
@@ -19,6 +21,8 @@ struct InterpolationStage {
         v(to_x), v(to_y), v(to_sample);
     }
 };
+/// The stage's constants.  Throws InputError where a wire cannot hold the scalars or a weight of one.
+InterpolationStage build_interpolation(const StageInputs& in);
 
 /// Corners in the order x fastest: 000 100 010 110 001 101 011 111.
 template <class W>

@@ -13,13 +13,15 @@
 
 namespace squint {
 
+struct StageInputs;
+
 inline constexpr int kMostHalves = 8;  // a half vector for each light
 
 /// One ray in doubles, before any precision is applied: what every word starts from.
 struct RaySetup {
     Vec3 first{0, 0, 0};  // sample 0, in voxels
-    Vec3 last{0, 0,
-              0};  // sample `last_index`, in voxels: the exit, where samples are a whole step apart no more
+    // Sample `last_index`, in voxels: the exit, nearer to the sample before it than a step.
+    Vec3 last{0, 0, 0};
     Vec3 step{0, 0, 0};         // V, in voxels
     Vec3 direction{0, 0, 1};    // unit, world
     int slabs = 0;              // n = ceil(chord / step); 0: the ray misses the volume
@@ -56,6 +58,8 @@ struct LocationStage {
         v(to_location), v(to_weight), v(to_first), v(to_direction), v(to_length);
     }
 };
+/// The stage's constants.  Throws InputError where a wire cannot hold the volume or the step.
+LocationStage build_location(const StageInputs& in);
 
 template <class W>
 struct CellPosition {

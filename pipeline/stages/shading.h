@@ -12,6 +12,8 @@
 
 namespace squint {
 
+struct StageInputs;
+
 struct ShadingStage {
     ShadingModel model = ShadingModel::none;
     PowerRule power = PowerRule::squaring;
@@ -49,5 +51,8 @@ struct ShadingStage {
         v(power_table);
     }
 };
+/// The stage's constants.  Throws InputError for an exponent that its power rule cannot have, and where a wire is unsigned
+/// and the scene is lit.
+ShadingStage build_shading(const StageInputs& in);
 
 }  // namespace squint

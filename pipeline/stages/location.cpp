@@ -1,0 +1,56 @@
+#include "pipeline/stages/location.h"
+
+#include "core/error.h"
+#include "pipeline/stages/inputs.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace squint {
+
+LocationStage build_location(const StageInputs& in) {
+    const auto longest =
+        static_cast<double>(std::max({in.volume.dims.x, in.volume.dims.y, in.volume.dims.z})) - 1;
+    require_integer_bits(in, Wire::location, bits_for(longest),
+                         fmt::format("a volume of {} voxels along its longest axis", longest + 1));
+    if (in.specs[Wire::location].overflow == Overflow::wrap)
+        throw InputError(
+            "precision.location: wrap, but a location is held inside the volume: sat is allowed");
+    require_signed(in, Wire::direction);
+    require_integer_bits(in, Wire::direction, bits_for(in.scene.sampling.step),
+                         fmt::format("a step of {} voxels", in.scene.sampling.step));
+    require_integer_bits(in, Wire::length, 1, "a full step of 1.0");
+    LocationStage s;
+    const Volume& v = in.volume;
+    s.location = in.specs[Wire::location], s.direction = in.specs[Wire::direction],
+    s.length = in.specs[Wire::length];
+    if (in.scene.sampling.position == PositionRule::accumulate) {
+        // Adding V again and again in the location's format is P0 + k q(V): the same integers.
+        s.direction.format.fraction_bits = s.location.format.fraction_bits;
+    }
+    s.location_fraction = s.location.format.fraction_bits;
+    s.direction_fraction = s.direction.format.fraction_bits;
+    s.length_fraction = s.length.format.fraction_bits;
+    s.common_fraction = std::max(s.location_fraction, s.direction_fraction);
+    s.to_location = Rescale(s.common_fraction, s.location, wire_index(Wire::location));
+    s.to_weight = rescale(in, s.location_fraction, Wire::weight);
+    s.to_first = Rescale(s.location_fraction, s.location, wire_index(Wire::location));
+    s.to_direction = Rescale(s.direction_fraction, s.direction, wire_index(Wire::direction));
+    s.to_length = rescale(in, s.length_fraction, Wire::length);
+    // Dropping less than a last bit of V moves sample k by less than k of them, and P0 has lost its own: so
+    // far can P0 + kV leave the box.
+    const auto drift =
+        (static_cast<std::int64_t>(in.most_steps + 4) << (s.common_fraction - s.direction_fraction)) +
+        (std::int64_t{1} << (s.common_fraction - s.location_fraction));
+    for (int axis = 0; axis < 3; ++axis) {
+        const auto a = static_cast<std::size_t>(axis);
+        s.limit[a] = (v.dims[axis] - 1) << s.location_fraction;
+        s.last_cell[a] = std::max<std::int64_t>(v.dims[axis] - 2, 0);
+        s.low[a] = -drift;
+        s.high[a] = (s.limit[a] << (s.common_fraction - s.location_fraction)) + drift;
+    }
+    return s;
+}
+
+}  // namespace squint

@@ -1,0 +1,84 @@
+#include "pipeline/stages/shading.h"
+
+#include "core/error.h"
+#include "core/portable_math.h"
+#include "pipeline/stages/inputs.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace squint {
+
+ShadingStage build_shading(const StageInputs& in) {
+    if (in.lit)
+        for (const Wire wire : {Wire::light, Wire::dot}) require_signed(in, wire);
+    ShadingStage s;
+    const ShadingSettings& settings = in.scene.shading;
+    s.model = settings.model, s.power = settings.power, s.two_sided = settings.two_sided;
+    s.premultiplied = in.premultiplied;
+    s.color_fraction = s.premultiplied ? fraction(in, Wire::slab_color) : fraction(in, Wire::slab_ratio);
+    s.light_fraction = fraction(in, Wire::light), s.normal_fraction = fraction(in, Wire::normal);
+    s.dot_fraction = fraction(in, Wire::dot), s.power_fraction = fraction(in, Wire::power);
+    s.intensity_fraction = fraction(in, Wire::intensity), s.material_fraction = fraction(in, Wire::material);
+    s.light_spec = in.specs[Wire::light];
+    s.lights = static_cast<int>(in.scene.lights.size());
+    s.half_per_ray = in.camera.projection == Projection::perspective;
+    const Spec material = in.specs[Wire::material];
+    for (std::size_t l = 0; l < in.scene.lights.size(); ++l) {
+        const Light& light = in.scene.lights[l];
+        const Vec3 towards = light.headlight ? -in.camera.view : light.direction.normalized();
+        const Vec3 half = (towards - in.camera.view).normalized();
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto a = static_cast<std::size_t>(axis);
+            s.light_exact[l][a] = towards[axis], s.half_exact[l][a] = half[axis],
+            s.color_exact[l][a] = light.color[axis];
+            s.light[l][a] = quantise_real(towards[axis], s.light_spec);
+            s.half[l][a] = quantise_real(half[axis], s.light_spec);
+            s.color[l][a] = quantise_real(light.color[axis], material);
+        }
+        s.white = s.white && light.color == Vec3(1, 1, 1);
+    }
+    s.material = {settings.ka, settings.kd, settings.ks};
+    s.ka = quantise_real(settings.ka, material), s.kd = quantise_real(settings.kd, material),
+    s.ks = quantise_real(settings.ks, material);
+    s.squarings = static_cast<int>(std::bit_width(static_cast<std::uint64_t>(settings.exponent))) - 1;
+    if (settings.power == PowerRule::squaring && settings.exponent != std::ldexp(1.0, s.squarings))
+        throw InputError(
+            fmt::format("shading.exponent: {} is not a power of two, which shading.power = \"squaring\" "
+                        "needs; use {} or power = \"table\"",
+                        settings.exponent, std::ldexp(1.0, s.squarings)));
+    // (p + 1) / 2: a whole exponent needs one fraction bit; another gets what 31 bits leave, 20 more at most.
+    const int slope_bits = settings.exponent == std::floor(settings.exponent)
+                               ? 1
+                               : std::min(21, 32 - bits_for(settings.exponent + 2));
+    s.parabola_slope =
+        static_cast<std::int64_t>(std::floor(std::ldexp((settings.exponent + 1) / 2, slope_bits) + 0.5));
+    s.power_table_bits = std::min(10, s.power_fraction);
+    if (settings.power == PowerRule::table) {
+        // 1024 rows, linear between them: error p^2 / 8 / 2^20 for exponent p.
+        const int rows = 1 << s.power_table_bits;
+        s.power_table = Table(rows + 1, 1);
+        for (int i = 0; i <= rows; ++i)
+            s.power_table.set(i, 0, portable::pow(std::ldexp(i, -s.power_table_bits), settings.exponent),
+                              in.specs[Wire::power]);
+    }
+    s.power_table.wire = wire_index(Wire::power);
+    s.to_light = rescale(in, s.light_fraction, Wire::light);
+    s.to_dot = rescale(in, s.normal_fraction + s.light_fraction, Wire::dot);
+    s.to_light_view = rescale(in, 2 * s.light_fraction, Wire::dot);
+    s.to_reflected = rescale(in, 2 * s.dot_fraction, Wire::dot);
+    s.to_power_input = rescale(in, s.dot_fraction, Wire::power);
+    s.to_power = rescale(in, 2 * s.power_fraction, Wire::power);
+    s.to_power_lerp = rescale(in, 2 * s.power_fraction - s.power_table_bits, Wire::power);
+    s.to_fall = rescale(in, s.power_fraction + slope_bits, Wire::power);
+    s.to_diffuse_sum = rescale(in, s.dot_fraction + s.material_fraction, Wire::intensity);
+    s.to_specular_sum = rescale(in, s.power_fraction + s.material_fraction, Wire::intensity);
+    s.to_diffuse = s.to_specular = rescale(in, s.material_fraction + s.intensity_fraction, Wire::intensity);
+    s.to_lit = rescale(in, s.color_fraction + s.intensity_fraction, Wire::lit_color);
+    return s;
+}
+
+}  // namespace squint
