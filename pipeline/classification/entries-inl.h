@@ -74,7 +74,7 @@ HWY_INLINE EntryPosition<W> entry_position(const EntrySpacing& e, W input) {
                        constant<W>(std::int64_t{1} << e.input_fraction))};
 }
 
-/// One where a position is opaque: on an opaque entry, or between two (CONVENTIONS.md).
+/// One where a position is opaque: on an opaque entry, or between two (docs/conventions.md).
 template <class W>
 HWY_INLINE auto is_opaque(const EntryLookup& e, const EntryPosition<W>& at) {
     const W zero = constant<W>(0), one = constant<W>(std::int64_t{1} << e.input_fraction);

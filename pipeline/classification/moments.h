@@ -10,7 +10,7 @@
 // and differ in the weights g_j alone, a table over x: LEG's are bounded at every depth, PIPS's up to its
 // trusted one.  A slab seen from the other side changes the sign of odd L_j.
 //
-// Moments come from overlapped level tables (MATH B3.6): blocks of 2^(l+1) entries every 2^l, prefixes from
+// Moments come from overlapped level tables (docs/math.md#b36): blocks of 2^(l+1) entries every 2^l, prefixes from
 // the block's own start, in units of the block's own depth, so that every word lies in [0, 1] and a slab's
 // difference cancels two bits at most for even matter.  Units cancel in L_j.  Inside an entry extinction and
 // colour are constant.

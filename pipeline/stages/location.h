@@ -1,5 +1,5 @@
 // Stage 1: sample location.  ray (P0, V) and sample number k -> cell (I.0) and interpolation weights (1.F),
-// per axis. Squeeze, section 4.6; CONVENTIONS.md "Space and rays".
+// per axis. Squeeze, section 4.6; docs/conventions.md#space-and-rays.
 //
 //     location 11.12    iiiiiiiiiii ffffffffffff
 //                       cell index  weight (the fraction, widened by one bit so that 1.0 exists)

@@ -1,5 +1,5 @@
 // Stage 5: shading.  slab colour (1.F), opacity (1.F), normal (s1.F) -> lit colour (1.F).
-// Phong and Blinn-Phong, Squeeze equations 10 and 11 as CONVENTIONS.md "Light" defines them:
+// Phong and Blinn-Phong, Squeeze equations 10 and 11 as docs/conventions.md#light defines them:
 //
 //     C = alpha (c (ka + kd sum max(0, N.L)) + ks sum max(0, N.H)^p)
 #pragma once

@@ -1,4 +1,4 @@
-// Moments that do not cancel: a disjoint sparse table over the entries (MATH.md, B3.6).
+// Moments that do not cancel: a disjoint sparse table over the entries (docs/math.md#b36).
 // Level l cuts the entries into blocks of 2^(l+1) with their middle m at odd multiples of 2^l, and holds for
 // every entry i of a block the depth |T_i - T_m| and the moments int c |T - T_m|^k dT between i and m: sums
 // of positive terms.  The slab between entries lo and hi lies on both sides of the middle m = (hi >> l) << l

@@ -20,7 +20,7 @@ inline constexpr int kMostLegendre = 4;
 double legendre_weight(int j, double x);
 
 /// The depth at which a slab is cut: 0.125, 1.5, 1.5, 2.5.  Up to 0.125, 1.7, 1.7 and 5.2 the three profiles
-/// of MATH B2 stay within half an LSB8; order 4 needs less on noise (docs/measurements/slab-accuracy.md).
+/// of docs/math.md#b2 stay within half an LSB8; order 4 needs less on noise (docs/measurements/slab-accuracy.md).
 double legendre_split_depth(int order);
 
 /// C of a slab from its moments, depth > 0; no clamp, no split.

@@ -1,5 +1,5 @@
 // The transfer function between its entries: extinction and colour linear, opaque where both neighbours are
-// (CONVENTIONS.md, "Scalars and transfer function").  Coordinates are in entries, [0, size - 1]; others are
+// (docs/conventions.md#scalars-and-transfer-function).  Coordinates are in entries, [0, size - 1]; others are
 // clamped.
 #pragma once
 

@@ -3,7 +3,7 @@
 //   K = sum_k (-1)^(k-1) q_(k-1) / (k-1)!  /  sum_k (-1)^(k-1) x^k / k!,  k = 1 .. n;   C = K (1 - e^-x)
 // n = 1: K = dX_1 / dT, exact in alpha, the tau-weighted mean colour: it cannot tell front from back.  Even
 // orders divide by zero at x = 2 (n = 2) and x = 2.79 (n = 4); beyond their trusted depth all orders are
-// worse than order 1 (MATH, B2).
+// worse than order 1 (docs/math.md#b2).
 #pragma once
 
 #include "pipeline/classification/tables/opaque_prediction.h"
@@ -20,7 +20,7 @@ struct Verdict {
 };
 
 /// The optical depth up to which order n is better than order 1: infinite for 1, then 1, 2, 1.5, 3 (half the
-/// way to the poles of 2 and 4; where the worst profile of MATH B2 crosses order 1 for 3 and 5).
+/// way to the poles of 2 and 4; where the worst profile of docs/math.md#b2 crosses order 1 for 3 and 5).
 double trusted_depth(int order);
 
 /// The smallest optical depth at which order n divides by zero: 2 for 2, 2.79 for 4; infinite for odd orders.
