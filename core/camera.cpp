@@ -86,8 +86,7 @@ void check(const CameraSettings& settings, int width, int height) {
 
 /// Distance from center to the farthest corner of the volume: a ball that no turn leaves.
 double framing_radius(const Volume& volume, const Vec3& center) {
-    const Vec3 low = volume.origin - center,
-               high = volume.world_from_voxel(Vec3(volume.dims - Index3(1))) - center;
+    const Vec3 low = volume.box_low() - center, high = volume.box_high() - center;
     const Vec3 farthest(std::max(std::fabs(low.x), std::fabs(high.x)),
                         std::max(std::fabs(low.y), std::fabs(high.y)),
                         std::max(std::fabs(low.z), std::fabs(high.z)));

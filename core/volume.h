@@ -56,10 +56,23 @@ struct Volume {
                              [](std::int64_t voxel, const VoxelRun& run) { return voxel < run.first; });
         return after != zeros.begin() && end <= (after - 1)->end;
     }
+    /// The box that is rendered: from the first to the last voxel centre.  An axis of one voxel is one spacing
+    /// thick, half to each side of its centre, and the field is constant along it.
+    Vec3 box_low() const { return world_from_voxel(Vec3(0) - half_of_thin_axes()); }
+    Vec3 box_high() const { return world_from_voxel(Vec3(dims - Index3(1)) + half_of_thin_axes()); }
+    bool is_thin(int axis) const { return dims[axis] == 1; }
+
     double smallest_spacing() const { return std::min(spacing.x, std::min(spacing.y, spacing.z)); }
+
+    double value_at(double scalar) const { return value_scale * scalar + value_offset; }  // file's units
 
     Vec3 voxel_from_world(const Vec3& p) const { return (p - origin) / spacing; }
     Vec3 world_from_voxel(const Vec3& p) const { return origin + p * spacing; }
+
+  private:
+    Vec3 half_of_thin_axes() const {
+        return {is_thin(0) ? 0.5 : 0.0, is_thin(1) ? 0.5 : 0.0, is_thin(2) ? 0.5 : 0.0};
+    }
 };
 
 }  // namespace squint

@@ -276,7 +276,7 @@ class Reference {
 Vec3 Reference::corner(bool high) const {
     const Volume& v = *plan_.volume;
     const auto& clip = high ? plan_.scene.clip.high : plan_.scene.clip.low;
-    Vec3 corner = high ? v.origin + v.spacing * Vec3(v.dims - Index3(1)) : v.origin;
+    Vec3 corner = high ? v.box_high() : v.box_low();
     for (int a = 0; clip && a < 3; ++a)
         corner[a] = high ? std::min(corner[a], (*clip)[a]) : std::max(corner[a], (*clip)[a]);
     return corner;

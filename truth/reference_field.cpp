@@ -138,6 +138,7 @@ CellWalk::CellWalk(const Volume& volume, const Ray& ray, const Interval& inside,
       end_(inside.last) {
     for (int a = 0; a < 3; ++a) {
         last_cell_[a] = last_cell(volume.dims[a]);
+        if (volume.is_thin(a)) origin_[a] = rate_[a] = 0;  // the field is constant along it
         const double at = origin_[a] + rate_[a] * here_;
         // On a plane between two cells the ray is in the one it goes into.
         const double cell = rate_[a] < 0 ? std::ceil(at) - 1 : std::floor(at);

@@ -1,5 +1,6 @@
 #include "pipeline/plan/plan.h"
 
+#include "pipeline/plan/findings.h"
 #include "pipeline/plan/ranges.h"
 #include "pipeline/stages/inputs.h"
 #include "pipeline/stages/ray_setup-inl.h"

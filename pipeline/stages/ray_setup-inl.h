@@ -48,6 +48,10 @@ HWY_INLINE RaySetupOf<D> set_up_ray(const Plan& plan, D column, D row) {
         const auto voxel_at = [&](D distance) HWY_ATTR {
             return (ray.origin[a] + ray.direction[a] * distance - origin) / spacing;
         };
+        if (volume.is_thin(axis)) {  // the field is constant along it
+            setup.step[a] = setup.first[a] = setup.last[a] = D(0);
+            continue;
+        }
         const D step = ray.direction[a] * step_world / spacing, first = voxel_at(inside.first);
         setup.step[a] = choose(hit, step, D(0));
         setup.first[a] = choose(hit, middle ? first + step * D(0.5) : first, D(0));
