@@ -6,6 +6,7 @@
 #include "cli/common.h"
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/text.h"
 
 #include <unistd.h>
 
@@ -59,7 +60,7 @@ void handle(int signal, void (*handler)(int)) {
 }
 
 int report(int code, const char* kind, const char* what) {
-    std::fprintf(stderr, "squint: %s%s\n", kind, what);
+    std::fprintf(stderr, "squint: %s%s\n", kind, message_text(what).c_str());
     return code;
 }
 
