@@ -1,6 +1,7 @@
 #include "scene/toml.h"
 
 #include "core/error.h"
+#include "core/text.h"
 
 #include <fmt/format.h>
 
@@ -8,6 +9,7 @@
 #include <array>
 #include <cerrno>
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <numeric>
 #include <sstream>
@@ -83,50 +85,77 @@ TomlValue from_node(const toml::node& node) {
 
 void refuse_unsafe_bytes(std::string_view text, const std::string& name) {
     int line = 1, column = 1;
-    for (std::size_t i = 0; i < text.size(); ++i, ++column) {
+    for (std::size_t i = 0; i < text.size(); ++column) {
         const auto byte = static_cast<unsigned char>(text[i]);
         const bool line_break = byte == '\n' || (byte == '\r' && i + 1 < text.size() && text[i + 1] == '\n');
-        if (!line_break && byte != '\t' && (byte < 0x20 || byte > 0x7e))
+        const char32_t code = next_code_point(text, i);
+        const bool is_control = code < 0x20 || (code >= 0x7f && code < 0xa0);
+        if (!line_break && byte != '\t' && (is_control || code == 0xfffd))
             throw InputError(
-                fmt::format("{}:{}:{}: found byte 0x{:02x}; allowed: printable ASCII, tabs and line breaks "
-                            "(\\u00e9 in a string for others)",
-                            name, line, column, byte));
+                fmt::format("{}:{}:{}: found byte 0x{:02x}; allowed: UTF-8 without control characters", name,
+                            line, column, byte));
         if (byte == '\n') ++line, column = 0;
     }
 }
 
-// One line: toml++ quotes keys and characters as they come.
-std::string one_line(std::string_view text) {
-    std::string line;
-    for (const char c : text) {
-        const auto byte = static_cast<unsigned char>(c);
-        line += byte < 0x20 || byte > 0x7e ? ' ' : c;
+/// toml++ 3.3 is safe with ASCII alone: every other character goes through it as a name, `@0:fc;`, whose begin no
+/// text holds that has one.
+class AsciiText {
+  public:
+    explicit AsciiText(std::string_view text) {
+        int number = 0;
+        do mark_ = fmt::format("@{}:", number++);
+        while (text.find(std::string_view(mark_).substr(1)) != std::string_view::npos);
+        int line = 1, column = 1;
+        for (std::size_t i = 0; i < text.size(); ++column) {
+            const std::size_t at = i;
+            const char32_t code = next_code_point(text, i);
+            if (code < 0x80) {
+                ascii_ += text[at];
+                if (text[at] == '\n') ++line, column = 0;
+                continue;
+            }
+            const std::string name = fmt::format("{}{:x};", mark_, static_cast<unsigned>(code));
+            names_.push_back({line, column, static_cast<int>(name.size()) - 1});
+            ascii_ += name;
+        }
     }
-    return line;
-}
+    const std::string& text() const { return ascii_; }
+
+    void restore(TomlValue& value) const {
+        if (names_.empty()) return;
+        restore(value.text), restore(value.key);
+        place(value.line, value.column), place(value.key_line, value.key_column);
+        for (TomlValue& item : value.items) restore(item);
+    }
+    /// Where a column of the ASCII text stands in the text itself.
+    void place(int line, int& column) const {
+        const auto first = std::lower_bound(names_.begin(), names_.end(), line,
+                                            [](const Name& name, int at) { return name.line < at; });
+        for (auto name = first; name != names_.end() && name->line == line && name->column < column; ++name)
+            column -= std::min(name->more, column - name->column);
+    }
+
+  private:
+    struct Name {
+        int line, column, more;  // columns that it takes beyond its character's
+    };
+
+    void restore(std::string& value) const {
+        for (std::size_t at = 0; (at = value.find(mark_, at)) != std::string::npos; ++at) {
+            char* end = nullptr;
+            const unsigned long code = std::strtoul(value.c_str() + at + mark_.size(), &end, 16);
+            const auto size = static_cast<std::size_t>(end - value.c_str()) + 1 - at;
+            if (*end == ';' && code >= 0x80 && code <= 0x10ffff)
+                value.replace(at, size, utf8_of(static_cast<char32_t>(code)));
+        }
+    }
+
+    std::string mark_, ascii_;
+    std::vector<Name> names_;  // in order
+};
 
 // --- Texts ---------------------------------------------------------------------------------------
-
-/// The code point that starts at `i` in UTF-8, moving `i` past it; U+FFFD for a byte that starts none.
-char32_t next_code_point(std::string_view text, std::size_t& i) {
-    const auto byte = [&](std::size_t at) { return static_cast<unsigned char>(text[at]); };
-    const unsigned char first = byte(i++);
-    const int more = first < 0x80                    ? 0
-                     : first >= 0xc2 && first < 0xe0 ? 1
-                     : first >= 0xe0 && first < 0xf0 ? 2
-                     : first >= 0xf0 && first < 0xf5 ? 3
-                                                     : -1;
-    if (more < 0 || i + static_cast<std::size_t>(more) > text.size()) return 0xfffd;
-    char32_t code = more == 0 ? first : first & (0x3fu >> more);
-    for (int k = 0; k < more; ++k) {
-        const unsigned char next = byte(i + static_cast<std::size_t>(k));
-        if ((next & 0xc0u) != 0x80u) return 0xfffd;
-        code = (code << 6) | (next & 0x3fu);
-    }
-    if ((code >= 0xd800 && code < 0xe000) || code > 0x10ffff) return 0xfffd;
-    i += static_cast<std::size_t>(more);
-    return code;
-}
 
 std::string escaped(std::string_view text, std::size_t most) {
     std::string out;
@@ -186,12 +215,20 @@ TomlValue parse_toml(std::string_view text, const std::string& name) {
     if (text.size() > kLargestText)
         throw InputError(
             fmt::format("{}: found {} bytes; allowed: at most {}", name, text.size(), kLargestText));
+    constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+    if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
     refuse_unsafe_bytes(text, name);
+    const AsciiText ascii(text);
     try {
-        return from_node(toml::parse(text, name));
+        TomlValue value = from_node(toml::parse(ascii.text(), name));
+        ascii.restore(value);
+        return value;
     } catch (const toml::parse_error& error) {
-        throw InputError(fmt::format("{}:{}:{}: not TOML: {}", name, error.source().begin.line,
-                                     error.source().begin.column, one_line(error.description())));
+        const int line = static_cast<int>(error.source().begin.line);
+        int column = static_cast<int>(error.source().begin.column);
+        ascii.place(line, column);
+        throw InputError(
+            fmt::format("{}:{}:{}: not TOML: {}", name, line, column, excerpt(error.description(), 160)));
     } catch (const std::logic_error&) {
         throw InputError(fmt::format("{}: not TOML that can be read: a name in brackets is broken", name));
     }

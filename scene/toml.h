@@ -25,8 +25,8 @@ struct TomlValue {
     const TomlValue* find(std::string_view name) const;  // entry of a table, or null
 };
 
-/// Parses a whole text.  Refuses bytes that toml++ 3.3 is not safe with: everything but printable ASCII, tabs
-/// and line breaks.  Throws InputError `name:line:column: ...`.
+/// Parses a whole text in UTF-8.  Refuses control characters but tabs and line breaks.  Columns count characters.
+/// Throws InputError `name:line:column: ...`.
 TomlValue parse_toml(std::string_view text, const std::string& name);
 
 /// Reads a file of at most 16 MiB and parses it.
