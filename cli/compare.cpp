@@ -3,12 +3,14 @@
 
 #include "cli/common.h"
 #include "core/error.h"
+#include "core/text.h"
 #include "pipeline/record.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 
 namespace squint::cli {
@@ -83,10 +85,40 @@ void write_difference(const CompareArguments& a, const Image& x, const Image& y)
         throw InputError(fmt::format("--diff {}: the name must end in .exr or .png", a.diff));
 }
 
+/// `image` as its preview shows it, over the background that its file names.
+Image as_preview(const Image& image, const Attributes& attributes) {
+    double background[3] = {0, 0, 0};
+    if (const auto given = attributes.find("squint.image.background"); given != attributes.end())
+        if (std::sscanf(given->second.c_str(), "[%lf, %lf, %lf]", background, background + 1,
+                        background + 2) != 3)
+            background[0] = background[1] = background[2] = 0;
+    return preview_of(image, background);
+}
+
+/// Linear light beside codes for a display is shown as those are.
+void show_alike(const CompareArguments& a, Image& x, const Attributes& of_x, Image& y,
+                const Attributes& of_y) {
+    const auto is_light = [](const Image& image) {
+        return !image.is_display && image.find("A") && image.find("R");
+    };
+    const auto is_shown = [](const Image& image) { return image.is_display && !image.find("A"); };
+    const bool first = is_light(x) && is_shown(y);
+    if (!first && !(is_light(y) && is_shown(x))) return;
+    if (a.srgb)
+        throw InputError("--transfer srgb: one picture is encoded already; allowed beside a preview: linear");
+    (first ? x : y) = first ? as_preview(x, of_x) : as_preview(y, of_y);
+    std::fputs(fmt::format("note: {} is compared as its preview: over its background, 8-bit sRGB\n",
+                           printable(first ? a.a : a.b))
+                   .c_str(),
+               stderr);
+}
+
 }  // namespace
 
 int run(const CompareArguments& a) {
-    const Image x = read_image(a.a), y = read_image(a.b);
+    Attributes of_x, of_y;
+    Image x = read_image(a.a, &of_x), y = read_image(a.b, &of_y);
+    show_alike(a, x, of_x, y, of_y);
     Comparison comparison;
     std::vector<std::string> failed;
     try {

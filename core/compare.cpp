@@ -178,6 +178,11 @@ void check_same_shape(const Image& a, const Image& b) {
     if (a.width != b.width || a.height != b.height)
         throw InputError(
             fmt::format("compare: sizes differ, {} x {} and {} x {}", a.width, a.height, b.width, b.height));
+    if (a.left != b.left || a.top != b.top)
+        throw InputError(
+            fmt::format("compare: the pictures lie at different places, from x {}, y {} and x {}, y {} "
+                        "(the data windows of their files)",
+                        a.left, a.top, b.left, b.top));
     if (a.channels.empty() || a.width < 1 || a.height < 1)
         throw InputError("compare: the images have no pixels");
     for (const auto& [one, other] : {std::pair{&a, &b}, std::pair{&b, &a}})

@@ -29,7 +29,7 @@ struct Comparison {
     const Difference& channel(const std::string& name, bool of_foreground) const;
 };
 
-/// Throws InputError when sizes or channel names differ or any value is not finite: never a pass.  `srgb`
+/// Throws InputError when sizes, places or channel names differ or any value is not finite: never a pass.  `srgb`
 /// encodes R, G and B first (below 0 is 0), for differences as a display shows them.
 Comparison compare(const Image& a, const Image& b, bool srgb = false, bool with_ssim = true);
 

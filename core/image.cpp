@@ -2,8 +2,10 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/exr_header.h"
 #include "core/pictures/pictures.h"
 #include "core/srgb.h"
+#include "core/volume_data.h"
 
 #include <dlfcn.h>
 #include <fmt/format.h>
@@ -12,6 +14,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <filesystem>
 
 namespace squint {
 namespace {
@@ -113,10 +116,14 @@ void write_exr(const Image& image, const std::string& path, const Attributes& at
     write(packed_picture, path);
 }
 
-void write_preview_png(const Image& image, const std::string& path, const double background[3], int level) {
+namespace {
+/// R G B side by side, 8-bit sRGB.
+std::vector<std::uint8_t> preview_codes(const Image& image, const std::string& path,
+                                        const double background[3]) {
     static const Encoder encode_8bit;
     check_shape(image, path);
     const Channel* alpha = image.find("A");
+    if (alpha && alpha->is_words()) alpha = nullptr;
     std::vector<std::uint8_t> packed(pixels(image) * 3);
     for (std::size_t c = 0; c < 3; ++c) {
         const Channel* color = image.find(std::string(1, "RGB"[c]));
@@ -127,6 +134,23 @@ void write_preview_png(const Image& image, const std::string& path, const double
             packed[i * 3 + c] = encode_8bit(static_cast<double>(color->values[i]) + clear * background[c]);
         }
     }
+    return packed;
+}
+}  // namespace
+
+Image preview_of(const Image& image, const double background[3]) {
+    const std::vector<std::uint8_t> codes = preview_codes(image, "preview", background);
+    Image shown{image.width, image.height, {}, image.left, image.top, true};
+    for (std::size_t c = 0; c < 3; ++c) {
+        Channel& channel = shown.add_float(std::string(1, "RGB"[c]));
+        for (std::size_t i = 0; i < channel.values.size(); ++i)
+            channel.values[i] = static_cast<float>(codes[i * 3 + c]) * (1.0F / 255);
+    }
+    return shown;
+}
+
+void write_preview_png(const Image& image, const std::string& path, const double background[3], int level) {
+    const std::vector<std::uint8_t> packed = preview_codes(image, path, background);
     constexpr auto kByte = pictures::Packed::Type::u8;
     write({"png",
            image.width,
@@ -139,6 +163,11 @@ void write_preview_png(const Image& image, const std::string& path, const double
 }
 
 Image read_image(const std::string& path, Attributes* attributes) {
+    std::error_code ignored;
+    if (path.ends_with(".exr") && std::filesystem::is_regular_file(path, ignored)) {
+        const MappedFile file = map_file(path);
+        check_exr_header(file.bytes.get(), file.size, path);
+    }
     return pictures::codec().read(path, attributes);
 }
 

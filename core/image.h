@@ -19,6 +19,8 @@ struct Channel {
 struct Image {
     int width = 0, height = 0;
     std::vector<Channel> channels;
+    int left = 0, top = 0;    // where its first pixel stands: the data window of an EXR that was read
+    bool is_display = false;  // codes for a display, as read from an 8-bit file
 
     Channel* find(const std::string& name);
     const Channel* find(const std::string& name) const;
@@ -38,9 +40,12 @@ void write_exr(const Image& image, const std::string& path, const Attributes& at
 void write_preview_png(const Image& image, const std::string& path, const double background[3],
                        int level = 6);
 
+/// What write_preview_png() writes, as read_image() reads it back: R G B, codes over 255.
+Image preview_of(const Image& image, const double background[3]);
+
 /// EXR, PNG and whatever else OpenImageIO opens by its extension.  Floats as stored, 8-bit codes as 0 to 1
 /// without decoding; UINT channels of EXR as words.  Channels come in the order of the reader: find them by
-/// name.  Throws InputError.
+/// name.  One picture a file: a second part of an EXR is refused.  Throws InputError.
 Image read_image(const std::string& path, Attributes* attributes = nullptr);
 
 }  // namespace squint

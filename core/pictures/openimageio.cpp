@@ -16,14 +16,14 @@ namespace {
 
 constexpr std::uint64_t kMostValues = std::uint64_t{1}
                                       << 31;  // width * height * channels of a file we agree to read
-constexpr std::uint64_t kMostUnasked = std::uint64_t{1} << 26;  // as many without a look at the file's size
-constexpr std::uint64_t kMostValuesPerByte = 4096;              // deflate reaches 1,032 bytes a byte
+constexpr std::uint64_t kMostUnasked = std::uint64_t{1} << 22;  // as many without a look at the file's size
+constexpr std::uint64_t kMostValuesPerByte = 1032;              // deflate makes as many bytes of one
 
 /// Messages of the library in one line.
 std::string one_line(std::string text) {
     while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back()))) text.pop_back();
     for (char& c : text)
-        if (static_cast<unsigned char>(c) < 0x20) c = ' ';
+        if (static_cast<unsigned char>(c) < 0x20 || static_cast<unsigned char>(c) > 0x7e) c = ' ';
     return text;
 }
 
@@ -119,8 +119,15 @@ Image read(const std::string& path, Attributes* attributes) {
     const auto input = open(path);
     const OIIO::ImageSpec spec = input->spec();
     check_spec(spec, path);
+    if (input->seek_subimage(1, 0))
+        throw InputError(fmt::format("{}: holds several pictures (parts of an EXR), allowed is one", path));
+    (void)input->geterror();  // that there is no other
+    if (!input->seek_subimage(0, 0))
+        throw InputError(fmt::format("{}: cannot read: {}", path, one_line(input->geterror())));
     Image image;
     image.width = spec.width, image.height = spec.height;
+    image.left = spec.x, image.top = spec.y;
+    image.is_display = spec.format == OIIO::TypeDesc::UINT8;
     try {
         for (int c = 0; c < spec.nchannels; ++c) {
             const bool words =

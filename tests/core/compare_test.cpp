@@ -173,6 +173,8 @@ TEST(Compare, WhatCannotBeComparedIsRefusedAndNeverPasses) {
     EXPECT_THAT(message(other, good), HasSubstr("channels differ"));
     other = good, other.channels[0].words.assign(6, 1), other.channels[0].values.clear();
     EXPECT_THAT(message(good, other), HasSubstr("words in one image"));
+    other = good, other.left = 1;
+    EXPECT_THAT(message(good, other), HasSubstr("lie at different places, from x 0, y 0 and x 1, y 0"));
     for (const float bad : {std::nanf(""), std::numeric_limits<float>::infinity()}) {
         other = good, other.channels[1].values[4] = bad;
         EXPECT_THAT(message(good, other),

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
+#include <cstring>
 #include <ctime>
 #include <filesystem>
 #include <fstream>
@@ -205,6 +206,92 @@ TEST(ReadImage, WhatCannotBeReadIsOneLineThatNamesTheFile) {
     EXPECT_THAT(refused("empty.exr"), HasSubstr("cannot read"));
     std::ofstream(folder / "text.png") << "text";
     EXPECT_THAT(refused("text.png"), AllOf(HasSubstr("text.png: cannot read"), Not(HasSubstr("\n"))));
+}
+
+long most_resident_kilobytes() {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return usage.ru_maxrss;
+}
+
+void put(std::string& bytes, std::size_t at, std::uint32_t number) {
+    std::memcpy(bytes.data() + at, &number, sizeof number);
+}
+
+TEST(ReadImage, AnExrThatClaimsMoreThanItHoldsIsRefusedBeforeMemoryIsTaken) {
+    const Folder folder;
+    write_exr(picture(), folder / "whole.exr", {{"squint.scene", "x"}});
+    const std::string whole = bytes_of(folder / "whole.exr");
+    const long before = most_resident_kilobytes();
+    const auto refused = [&](const std::string& bytes) {
+        std::ofstream(folder / "damaged.exr", std::ios::binary) << bytes;
+        return message([&] { (void)read_image(folder / "damaged.exr"); });
+    };
+    int attributes = 0;
+    for (std::size_t at = 8; whole[at] != 0; ++attributes) {
+        at += std::strlen(&whole[at]) + 1;
+        at += std::strlen(&whole[at]) + 1;  // name, type, length
+        std::uint32_t length = 0;
+        std::memcpy(&length, &whole[at], sizeof length);
+        for (const std::uint32_t claim :
+             {0x69000000u, 0xffffffffu, static_cast<std::uint32_t>(whole.size())}) {
+            std::string damaged = whole;
+            put(damaged, at, claim);
+            EXPECT_THAT(refused(damaged), HasSubstr("the EXR header is damaged: attribute \"")) << at;
+        }
+        at += 4 + length;
+    }
+    EXPECT_GT(attributes, 8);
+    const std::size_t window = whole.find("dataWindow") + std::strlen("dataWindow") + 1 + 6 + 4;
+    for (const std::size_t high : {window + 8, window + 12}) {
+        std::string damaged = whole;
+        put(damaged, high, 0x7ffffff0);
+        EXPECT_THAT(refused(damaged), HasSubstr("pixels in")) << high;
+    }
+    std::string wide = whole;
+    put(wide, window, 0x80000000), put(wide, window + 8, 0x7fffffff);
+    put(wide, window + 4, 0x80000000), put(wide, window + 12, 0x7fffffff);
+    EXPECT_THAT(refused(wide), HasSubstr("4294967296 x 4294967296 pixels"));
+    EXPECT_LT(most_resident_kilobytes() - before, 64 << 10);
+}
+
+TEST(ReadImage, APictureKnowsItsPlaceAndSeveralInAFileAreRefused) {
+    const Folder folder;
+    write_exr(picture(), folder / "a.exr", {});
+    EXPECT_EQ(read_image(folder / "a.exr").left, 0);
+    const std::string whole = bytes_of(folder / "a.exr");
+    std::string moved = whole;
+    const std::size_t window = whole.find("dataWindow") + std::strlen("dataWindow") + 1 + 6 + 4;
+    put(moved, window, 7), put(moved, window + 8, 7 + 36);
+    std::ofstream(folder / "moved.exr", std::ios::binary) << moved;
+    EXPECT_EQ(read_image(folder / "moved.exr").left, 7);
+    EXPECT_EQ(read_image(folder / "moved.exr").find("R")->values, picture().find("R")->values);
+
+    std::size_t end = 8;  // of the header
+    while (whole[end] != 0) {
+        for (int text = 0; text < 2; ++text) end += std::strlen(&whole[end]) + 1;
+        std::uint32_t length = 0;
+        std::memcpy(&length, &whole[end], sizeof length);
+        end += 4 + length;
+    }
+    const std::string header = whole.substr(8, end + 1 - 8);
+    std::string parts = whole.substr(0, 8) + header + header + whole.substr(end);
+    parts[5] |= 0x10;
+    std::ofstream(folder / "parts.exr", std::ios::binary) << parts;
+    EXPECT_THAT(message([&] { (void)read_image(folder / "parts.exr"); }),
+                HasSubstr("parts.exr: holds several pictures"));
+}
+
+TEST(Preview, IsTheOneThatItsPictureShows) {
+    const Folder folder;
+    const double background[3] = {0.25, 0.5, 1};
+    Image image = picture();
+    write_preview_png(image, folder / "a.png", background);
+    const Image back = read_image(folder / "a.png"), shown = preview_of(image, background);
+    EXPECT_TRUE(back.is_display);
+    for (const char* name : {"R", "G", "B"})
+        EXPECT_EQ(back.find(name)->values, shown.find(name)->values) << name;
+    EXPECT_FALSE(read_image(folder / "a.png").find("A"));
 }
 
 TEST(ReadImage, ATornOrFlippedExrIsRefusedOrReadButNeverWorse) {
