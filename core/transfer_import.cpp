@@ -1,7 +1,9 @@
 #include "core/transfer_import.h"
 
+#include "core/color_spaces.h"
 #include "core/error.h"
 #include "core/srgb.h"
+#include "core/text.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -20,16 +22,6 @@ namespace {
 
 constexpr std::size_t kMostBytes = std::size_t{16} << 20;  // colour maps are a few kilobytes
 constexpr std::size_t kMostPoints = 65536;
-
-/// Text of a file for a message of one line.
-std::string printable(std::string text) {
-    for (char& c : text)
-        if (static_cast<unsigned char>(c) < 0x20 || static_cast<unsigned char>(c) > 0x7e) c = ' ';
-    return text;
-}
-std::string excerpt(const std::string& text) {
-    return printable(text.size() > 60 ? text.substr(0, 60) + "..." : text);
-}
 
 [[noreturn]] void refuse(const std::string& path, const std::string& what) {
     throw InputError(fmt::format("{}: {}", path, what));
@@ -84,9 +76,40 @@ TransferFunction checked(TransferFunction function, const std::string& path) {
     return function;
 }
 
-// ---- ParaView
+// ---- JSON
 
-std::vector<double> json_numbers(const nlohmann::json& map, const char* key, const std::string& path) {
+using Json = nlohmann::json;
+
+/// A comma with nothing but space and comments before the bracket that follows is none: people's editors leave them.
+std::string without_trailing_commas(std::string text) {
+    std::size_t comma = std::string::npos;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        const char c = text[i];
+        if (c == '"') {
+            for (++i; i < text.size() && text[i] != '"'; ++i) i += text[i] == '\\';
+        } else if (c == '/' && i + 1 < text.size() && (text[i + 1] == '/' || text[i + 1] == '*')) {
+            const std::size_t end = text.find(text[i + 1] == '/' ? "\n" : "*/", i + 2);
+            i = end == std::string::npos ? text.size() : end + (text[i + 1] == '*');
+            continue;
+        } else if (c == ',') {
+            comma = i;
+            continue;
+        } else if (std::isspace(static_cast<unsigned char>(c))) {
+            continue;
+        } else if ((c == ']' || c == '}') && comma != std::string::npos) {
+            text[comma] = ' ';
+        }
+        comma = std::string::npos;
+    }
+    return text;
+}
+
+/// Comments and trailing commas are let pass.
+Json read_json(const std::string& path) {
+    return Json::parse(without_trailing_commas(read_text(path)), nullptr, true, true);
+}
+
+std::vector<double> json_numbers(const Json& map, const char* key, const std::string& path) {
     const auto& list = map.at(key);
     if (!list.is_array()) refuse(path, fmt::format("{} is not a list of numbers", key));
     std::vector<double> numbers;
@@ -98,24 +121,106 @@ std::vector<double> json_numbers(const nlohmann::json& map, const char* key, con
     return numbers;
 }
 
-/// The one colour map of the file: an object, or a list of one.
-const nlohmann::json& only_map(const nlohmann::json& document, const std::string& path) {
-    if (document.is_array() && document.size() != 1)
-        refuse(path, fmt::format("a list of {} colour maps, allowed is one", document.size()));
-    const nlohmann::json& map = document.is_array() ? document[0] : document;
-    if (!map.is_object()) refuse(path, "not a ParaView colour map, allowed is an object or a list of one");
-    return map;
+/// Where a curve bends by a midpoint and a sharpness of its own, it is none of straight pieces.
+void check_straight(double midpoint, double sharpness, const std::string& path, const std::string& name,
+                    std::size_t point) {
+    if (midpoint != 0.5 || sharpness != 0)
+        refuse(path, fmt::format("{}, point {}: midpoint {} and sharpness {}, allowed are 0.5 and 0 (linear)",
+                                 name, point + 1, midpoint, sharpness));
 }
 
-TransferFunction paraview_function(const nlohmann::json& map, bool srgb, const std::string& path) {
-    if (map.contains("ColorSpace") && map["ColorSpace"] != "RGB")
-        refuse(path, fmt::format("ColorSpace {}, allowed is \"RGB\": export the map with that interpolation",
-                                 excerpt(map["ColorSpace"].dump())));
-    if (!map.contains("RGBPoints")) refuse(path, "there is no RGBPoints, allowed are continuous colour maps");
+// ---- ParaView
+
+std::string name_of(const Json& map) {
+    const auto name = map.find("Name");
+    return name != map.end() && name->is_string() ? name->get<std::string>() : "";
+}
+
+/// The colour map of that name, or the only one of the file: an object, or a list.
+const Json& chosen_map(const Json& document, const std::string& wanted, const std::string& path) {
+    std::vector<const Json*> maps;
+    if (document.is_array())
+        for (const Json& map : document) maps.push_back(&map);
+    else
+        maps.push_back(&document);
+    for (const Json* map : maps)
+        if (!map->is_object())
+            refuse(path, "not a ParaView colour map, allowed is an object or a list of them");
+    if (wanted.empty() && maps.size() == 1) return *maps[0];
+    std::string names;
+    for (const Json* map : maps) {
+        if (!wanted.empty() && name_of(*map) == wanted) return *map;
+        names += (names.empty() ? "" : ", ") + name_of(*map);
+    }
+    refuse(path, fmt::format("{}: transfer_function.map chooses one of {}",
+                             wanted.empty() ? fmt::format("a list of {} colour maps", maps.size())
+                                            : fmt::format("no colour map \"{}\"", excerpt(wanted)),
+                             excerpt(names, 200)));
+}
+
+ColorSpace color_space_of(const Json& map, const std::string& path) {
+    const std::string space = map.contains("ColorSpace") && map["ColorSpace"].is_string()
+                                  ? map["ColorSpace"].get<std::string>()
+                              : map.contains("ColorSpace") ? map["ColorSpace"].dump()
+                                                           : "RGB";
+    const auto wraps = map.find("HSVWrap");
+    const bool wrapped = wraps != map.end() && (wraps->is_boolean() ? wraps->get<bool>() : *wraps == 1);
+    if (space == "RGB") return ColorSpace::rgb;
+    if (space == "HSV") return wrapped ? ColorSpace::hsv_wrapped : ColorSpace::hsv;
+    if (space == "Wrapped") return ColorSpace::hsv_wrapped;
+    if (space == "Lab" || space == "CIELAB") return ColorSpace::lab;
+    if (space == "Diverging") return ColorSpace::diverging;
+    if (space == "Step") return ColorSpace::step;
+    refuse(path,
+           fmt::format(
+               "ColorSpace \"{}\", allowed are RGB, HSV, Lab, CIELAB, Diverging and Step: export the map "
+               "with one of them",
+               excerpt(space)));
+}
+
+/// R G B between the points in their space -> points between which they are linear.
+std::vector<double> sampled(const std::vector<double>& points, ColorSpace space, const std::string& path) {
+    if (space == ColorSpace::rgb || points.empty() || points.size() % 4 != 0) return points;
+    const std::size_t count = points.size() / 4;
+    const std::size_t pieces = std::clamp<std::size_t>(1024 / count, 8, 64);
+    if (space != ColorSpace::step && count * pieces > kMostPoints)
+        refuse(path, fmt::format("RGBPoints has {} points, allowed is {} where they are sampled", count,
+                                 kMostPoints / pieces));
+    std::vector<double> fine;
+    const auto add = [&](double value, const Vec3& color) {
+        fine.insert(fine.end(), {value, color.x, color.y, color.z});
+    };
+    const auto color_of = [&](std::size_t i) {
+        return Vec3(points[4 * i + 1], points[4 * i + 2], points[4 * i + 3]);
+    };
+    for (std::size_t i = 0; i + 1 < count; ++i) {
+        const double from = points[4 * i], to = points[4 * i + 4];
+        add(from, color_of(i));
+        if (space == ColorSpace::step) add(from, color_of(i + 1));
+        for (std::size_t k = 1; k < pieces && space != ColorSpace::step; ++k) {
+            const double part = static_cast<double>(k) / static_cast<double>(pieces);
+            add(from + (to - from) * part, color_between(space, color_of(i), color_of(i + 1), part));
+        }
+    }
+    add(points[4 * (count - 1)], color_of(count - 1));
+    return fine;
+}
+
+TransferFunction paraview_function(const Json& map, bool srgb, const std::string& path) {
+    const ColorSpace space = color_space_of(map, path);
+    if (!map.contains("RGBPoints"))
+        refuse(
+            path,
+            map.contains("IndexedColors")
+                ? "a map of categories (IndexedColors), allowed are continuous ones (RGBPoints): write its "
+                  "colours as transfer_function.points"
+                : "there is no RGBPoints, allowed are continuous colour maps");
     const std::vector<double> colors = json_numbers(map, "RGBPoints", path);
+    (void)color_points(colors, false, path,
+                       "RGBPoints");  // a point that is wrong is named as the file counts it
 
     TransferFunction function;
-    function.color = color_points(colors, srgb, path, "RGBPoints");
+    function.color = color_points(sampled(colors, space, path), srgb, path, "RGBPoints");
     if (!map.contains("Points") ||
         map["Points"].is_null()) {  // what ParaView shows of a map that has colours alone
         function.opacity = {{function.color.front().value, 0}, {function.color.back().value, 1}};
@@ -124,10 +229,7 @@ TransferFunction paraview_function(const nlohmann::json& map, bool srgb, const s
     const std::vector<double> opacities = json_numbers(map, "Points", path);
     check_groups(opacities, 4, path, "Points");
     for (std::size_t i = 0; i < opacities.size(); i += 4) {
-        if (opacities[i + 2] != 0.5 || opacities[i + 3] != 0)
-            refuse(path, fmt::format(
-                             "Points, point {}: midpoint {} and sharpness {}, allowed are 0.5 and 0 (linear)",
-                             i / 4 + 1, opacities[i + 2], opacities[i + 3]));
+        check_straight(opacities[i + 2], opacities[i + 3], path, "Points", i / 4);
         function.opacity.push_back({opacities[i], opacities[i + 1]});
     }
     return function;
@@ -179,6 +281,15 @@ std::vector<double> counted_numbers(const std::string& line, const std::string& 
     return numbers;
 }
 
+void check_gradient_opacity(double opacity, const std::string& path) {
+    if (opacity != 1)
+        refuse(path,
+               fmt::format(
+                   "gradient opacity of {}, allowed is 1 everywhere: opacity depends on the scalar alone "
+                   "(in Slicer: Volume Rendering, Advanced, Gradient Opacity)",
+                   opacity));
+}
+
 TransferFunction slicer_function(const std::vector<std::string>& lines, bool srgb, const std::string& path) {
     constexpr std::size_t kSettings =
         6;  // interpolation, shade, diffuse, ambient, specular, power: the scene's own affair
@@ -196,18 +307,114 @@ TransferFunction slicer_function(const std::vector<std::string>& lines, bool srg
     const auto colors = counted_numbers(lines[kSettings + 2], path, "colour");
     check_groups(opacities, 2, path, "scalar opacity");
     if (!gradients.empty()) check_groups(gradients, 2, path, "gradient opacity");
-    for (std::size_t i = 1; i < gradients.size(); i += 2)
-        if (gradients[i] != 1)
-            refuse(path,
-                   fmt::format(
-                       "gradient opacity of {}, allowed is 1 everywhere: opacity depends on the scalar alone",
-                       gradients[i]));
+    for (std::size_t i = 1; i < gradients.size(); i += 2) check_gradient_opacity(gradients[i], path);
 
     TransferFunction function;
     function.color = color_points(colors, srgb, path, "colour");
     for (std::size_t i = 0; i < opacities.size(); i += 2)
         function.opacity.push_back({opacities[i], opacities[i + 1]});
     return function;
+}
+
+/// A member of a JSON object; refuses with what is there instead.
+const Json& member(const Json& object, const char* key, const std::string& path) {
+    const auto found = object.is_object() ? object.find(key) : object.end();
+    if (found == object.end())
+        refuse(path, fmt::format("there is no \"{}\" where a volume property has it", key));
+    return *found;
+}
+double json_number(const Json& object, const char* key, const std::string& path) {
+    const Json& value = member(object, key, path);
+    if (!value.is_number())
+        refuse(path, fmt::format("\"{}\" is {}, allowed is a number", key, excerpt(value.dump())));
+    return value.get<double>();
+}
+double json_number_or(const Json& object, const char* key, double otherwise, const std::string& path) {
+    return object.contains(key) ? json_number(object, key, path) : otherwise;
+}
+/// The points of one of a component's functions; calls take(point).
+template <class Take>
+void each_point(const Json& function, const std::string& name, const std::string& path, const Take& take) {
+    const Json& points = member(function, "points", path);
+    if (!points.is_array() || points.empty() || points.size() > kMostPoints)
+        refuse(path, fmt::format("{} has {} points, allowed is 1 to {}", name, points.size(), kMostPoints));
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        check_straight(json_number_or(points[i], "midpoint", 0.5, path),
+                       json_number_or(points[i], "sharpness", 0, path), path, name, i);
+        take(points[i]);
+    }
+}
+
+TransferFunction slicer_json_function(const Json& document, bool srgb, const std::string& path) {
+    const Json& properties = member(document, "volumeProperties", path);
+    if (!properties.is_array() || properties.size() != 1)
+        refuse(path, fmt::format("{} volume properties, allowed is one", properties.size()));
+    const Json& components = member(properties[0], "components", path);
+    if (!components.is_array() || components.size() != 1)
+        refuse(path, fmt::format("{} components, allowed is one", components.size()));
+    const Json& component = components[0];
+    TransferFunction function;
+    function.unit_distance = json_number_or(component, "scalarOpacityUnitDistance", 1, path);
+    std::vector<double> colors;
+    each_point(member(component, "rgbTransferFunction", path), "rgbTransferFunction", path,
+               [&](const Json& point) {
+                   colors.push_back(json_number(point, "x", path));
+                   const std::vector<double> color = json_numbers(point, "color", path);
+                   if (color.size() != 3)
+                       refuse(path, fmt::format("a colour of {} numbers, allowed is 3", color.size()));
+                   colors.insert(colors.end(), color.begin(), color.end());
+               });
+    function.color = color_points(colors, srgb, path, "rgbTransferFunction");
+    each_point(member(component, "scalarOpacity", path), "scalarOpacity", path, [&](const Json& point) {
+        function.opacity.push_back({json_number(point, "x", path), json_number(point, "y", path)});
+    });
+    if (component.contains("gradientOpacity") && !component.value("disableGradientOpacity", false))
+        each_point(component["gradientOpacity"], "gradientOpacity", path,
+                   [&](const Json& point) { check_gradient_opacity(json_number(point, "y", path), path); });
+    return function;
+}
+
+// ---- ImageVis3D
+
+TransferFunction imagevis3d_function(const std::string& text, bool srgb, const std::string& path) {
+    std::vector<double> numbers;
+    const std::string_view space = " \t\r\n";
+    for (std::size_t at = text.find_first_not_of(space); at < text.size();) {
+        const std::size_t end = std::min(text.find_first_of(space, at), text.size());
+        std::size_t from = 0;
+        const std::optional<double> number = number_at(text.substr(at, end - at), from);
+        if (!number)
+            refuse(path, fmt::format("\"{}\" is not a number", excerpt(text.substr(at, end - at), 20)));
+        numbers.push_back(*number);
+        at = std::min(text.find_first_not_of(space, end), text.size());
+    }
+    const std::size_t count = numbers.empty() ? 0 : (numbers.size() - 1) / 4;
+    if (count < 2 || count > kMostPoints || numbers.size() != 4 * count + 1 ||
+        numbers[0] != static_cast<double>(count))
+        refuse(path, fmt::format("{} numbers, allowed are a count of 2 to {} and as many colours r g b a",
+                                 numbers.size(), kMostPoints));
+    TransferFunction function;
+    std::vector<double> colors;
+    for (std::size_t i = 0; i < count; ++i) {
+        const double* rgba = &numbers[4 * i + 1];
+        colors.insert(colors.end(), {static_cast<double>(i), rgba[0], rgba[1], rgba[2]});
+        function.opacity.push_back({static_cast<double>(i), rgba[3]});
+    }
+    function.color = color_points(colors, srgb, path, "colours");
+    return function;
+}
+
+/// What reads a JSON file; its errors become one line.
+template <class Read>
+TransferFunction from_json(const std::string& path, const Read& read) {
+    try {
+        return checked(read(read_json(path)), path);
+    } catch (const Json::exception& error) {
+        const std::string what = error.what();  // "[json.exception.parse_error.101] parse error at ..."
+        const std::size_t begin = what.find("] ");
+        refuse(path, fmt::format("not the JSON it should be: {}",
+                                 excerpt(what.substr(begin == std::string::npos ? 0 : begin + 2), 120)));
+    }
 }
 
 // ---- Presets
@@ -282,22 +489,29 @@ bool find_transfer_preset(std::string_view name, TransferFunction& function) {
     return true;
 }
 
-TransferFunction import_paraview_json(const std::string& path, bool srgb, double unit_distance) {
-    const std::string text = read_text(path);
-    try {
-        const nlohmann::json document = nlohmann::json::parse(text);
-        TransferFunction function = paraview_function(only_map(document, path), srgb, path);
+TransferFunction import_paraview_json(const std::string& path, const std::string& map, bool srgb,
+                                      double unit_distance) {
+    return from_json(path, [&](const Json& document) {
+        TransferFunction function = paraview_function(chosen_map(document, map, path), srgb, path);
         function.unit_distance = unit_distance;
-        return checked(std::move(function), path);
-    } catch (const nlohmann::json::exception& error) {
-        refuse(path, fmt::format("not a JSON colour map: {}", printable(error.what())));
-    }
+        return function;
+    });
 }
 
 TransferFunction import_slicer_vp(const std::string& path, bool srgb) {
     const std::string text = read_text(path);
-    if (text.starts_with('{')) refuse(path, "a JSON volume property, allowed is the text format (.vp)");
+    if (text.starts_with('{')) return import_slicer_json(path, srgb);
     return checked(slicer_function(lines_of(text), srgb, path), path);
+}
+
+TransferFunction import_slicer_json(const std::string& path, bool srgb) {
+    return from_json(path, [&](const Json& document) { return slicer_json_function(document, srgb, path); });
+}
+
+TransferFunction import_imagevis3d(const std::string& path, bool srgb, double unit_distance) {
+    TransferFunction function = imagevis3d_function(read_text(path), srgb, path);
+    function.unit_distance = unit_distance;
+    return checked(std::move(function), path);
 }
 
 }  // namespace squint

@@ -14,21 +14,36 @@ namespace squint {
 std::vector<std::string> transfer_preset_names();
 bool find_transfer_preset(std::string_view name, TransferFunction& function);
 
-/// ParaView's JSON colour map: an object, or a list of one, with
-///     "RGBPoints": [value, r, g, b, ...]                      required
-///     "Points": [value, alpha, midpoint, sharpness, ...]      midpoint 0.5 and sharpness 0; absent: alpha
-///     rises from 0 to 1 "ColorSpace": "RGB"                                     the only one; absent means
-///     it
-/// Values are taken as they are, in the units of the volume's file: ParaView's own maps often span [0, 1] and
-/// must be rescaled there before export.  Other keys are ignored.  `srgb` decodes the points' colours. Throws
-/// InputError for the rest.
-TransferFunction import_paraview_json(const std::string& path, bool srgb, double unit_distance);
+/// ParaView's JSON colour map: an object, or a list of them, of which `map` names one (empty: the only one), with
+///
+///     "RGBPoints": [value, r, g, b, ...]                   required
+///     "Points": [value, alpha, midpoint, sharpness, ...]   midpoint 0.5 and sharpness 0; absent: alpha rises from 0
+///                                                          to 1
+///     "ColorSpace": "RGB"                                  absent: RGB; HSV ("HSVWrap": 1: the shorter way round),
+///                                                          Lab, CIELAB, Diverging and Step are sampled
+///
+/// Values are taken as they are, in the units of the volume's file: ParaView's own maps span [0, 1], and
+/// `transfer_function.range` stretches them.  Other keys are ignored; comments and trailing commas are let pass.
+/// `srgb` decodes the points' colours.  Throws InputError for the rest.
+TransferFunction import_paraview_json(const std::string& path, const std::string& map, bool srgb,
+                                      double unit_distance);
 
 /// 3D Slicer's text volume property (.vp): nine lines, empty ones apart,
-///     interpolation, shade, diffuse, ambient, specular, power   one number each; ignored, the scene says how
-///     it is lit N value alpha ...        scalar opacity: N numbers follow N value alpha ...        gradient
-///     opacity: 1 everywhere, or no points N value r g b ...        colour
+///
+///     interpolation, shade, diffuse, ambient, specular, power   a number each; ignored, the scene says how it is lit
+///     N value alpha ...                                         scalar opacity: N numbers follow
+///     N value alpha ...                                         gradient opacity: 1 everywhere, or no points
+///     N value r g b ...                                         colour
+///
 /// Slicer keeps no unit distance in it: 1, as VTK's default.  Throws InputError for the rest.
 TransferFunction import_slicer_vp(const std::string& path, bool srgb);
+
+/// 3D Slicer's JSON volume property (.vp.json) of one component: its `rgbTransferFunction`, `scalarOpacity` and
+/// `scalarOpacityUnitDistance` (absent: 1); `gradientOpacity` must be 1 everywhere.  Throws InputError for the rest.
+TransferFunction import_slicer_json(const std::string& path, bool srgb);
+
+/// ImageVis3D's one-dimensional function (.1dt): a count and as many colours r g b a, of the values 0, 1, 2 ...
+/// Throws InputError.
+TransferFunction import_imagevis3d(const std::string& path, bool srgb, double unit_distance);
 
 }  // namespace squint
