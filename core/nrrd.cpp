@@ -4,6 +4,7 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/text.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -30,13 +31,6 @@ constexpr double kObliqueTolerance = 1e-5;
 constexpr const char* kScaleKey = "squint value scale";
 constexpr const char* kOffsetKey = "squint value offset";
 constexpr const char* kBitsKey = "squint scalar bits";
-
-/// Bytes of a file as they may stand in a message: one line.
-std::string printable(std::string text) {
-    for (char& c : text)
-        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
-    return text;
-}
 
 // --- The header's text
 // -----------------------------------------------------------------------------------------------------
@@ -105,21 +99,20 @@ std::string data_path(const std::string& path, const std::string& name) {
     if (name == "LIST" || name.starts_with("LIST ") || name.find('%') != std::string::npos)
         throw InputError(fmt::format(
             "{}: data file is \"{}\", but data in several files are not supported: one name is allowed", path,
-            printable(name)));
+            excerpt(name)));
     if (data.is_absolute() || std::find(data.begin(), data.end(), "..") != data.end())
         throw InputError(fmt::format(
             "{}: data file is \"{}\", but only files in the header's own folder or below are allowed", path,
-            printable(name)));
+            excerpt(name)));
     const std::filesystem::path folder = std::filesystem::path(path).parent_path(), file = folder / data;
     std::error_code error;
     const auto really = [&](const std::filesystem::path& p) { return std::filesystem::canonical(p, error); };
     const std::filesystem::path home = really(folder.empty() ? "." : folder), there = really(file);
     if (!error && std::mismatch(home.begin(), home.end(), there.begin(), there.end()).first != home.end())
-        throw InputError(
-            fmt::format("{}: data file is \"{}\", a link to elsewhere, but only files in the header's own "
-                        "folder or below "
-                        "are allowed",
-                        path, printable(name)));
+        throw InputError(fmt::format(
+            "{}: data file is \"{}\", a link to elsewhere, but only files in the header's own folder "
+            "or below are allowed: put the header beside the file that the link leads to",
+            path, excerpt(name)));
     return file.string();  // where there is none, opening it says so
 }
 
@@ -161,7 +154,7 @@ std::string one_line(std::string text) {
     std::string message = lines.back();
     for (const std::string& line : lines)
         if (line.starts_with("trouble parsing")) message = line.substr(8) + ": " + message;
-    return printable(message);
+    return excerpt(message, 200);
 }
 
 void parse(const std::string& path, const HeaderText& header, Parsed& parsed) {
@@ -256,13 +249,38 @@ void take_directions(StoredVolume& stored, const Nrrd& nrrd) {
     }
 }
 
-/// Axes from `spacings` and `axis mins`, in the file's order.
+/// What `axis mins` and `axis maxs` say of an axis: a voxel is between two cell faces, or on two nodes; cells
+/// where the file does not say, as teem has it.
+double spacing_between_ends(const std::string& where, const NrrdAxisInfo& info, int axis) {
+    if (!AIR_EXISTS(info.min) || !std::isfinite(info.max - info.min) || !(info.min < info.max))
+        throw InputError(
+            fmt::format("{}: axis {} runs from {} to {} (axis mins, axis maxs), but needs two finite "
+                        "numbers, the least first",
+                        where, axis, info.min, info.max));
+    const double voxels = static_cast<double>(info.size) - (info.center == nrrdCenterNode);
+    if (voxels < 1)
+        throw InputError(
+            fmt::format("{}: axis {} has one node, but axis mins and axis maxs need two", where, axis));
+    return (info.max - info.min) / voxels;
+}
+
+/// Axes from `spacings`, `axis mins` and `axis maxs`, in the file's order.
 void take_spacings(StoredVolume& stored, const Parsed& parsed) {
+    const bool given = parsed.seen(nrrdField_spacings);
     for (int axis = 0; axis < 3; ++axis) {
         const NrrdAxisInfo& info = parsed.nrrd->axis[axis];
-        if (parsed.seen(nrrdField_spacings)) stored.spacing[axis] = info.spacing;
-        if (!AIR_EXISTS(info.min)) continue;
-        stored.origin[axis] = info.min + (info.center == nrrdCenterCell ? stored.spacing[axis] / 2 : 0);
+        bool cells = info.center == nrrdCenterCell;
+        if (given) stored.spacing[axis] = info.spacing;
+        if (AIR_EXISTS(info.max)) {
+            const double between = spacing_between_ends(stored.where, info, axis);
+            constexpr double kRoundingOfText = 1e-4;
+            if (given && !(std::abs(between - info.spacing) <= kRoundingOfText * between))
+                throw InputError(fmt::format("{}: axis {} has spacing {}, but its min and max make it {}",
+                                             stored.where, axis, info.spacing, between));
+            if (!given) stored.spacing[axis] = between;
+            cells = info.center != nrrdCenterNode;
+        }
+        if (AIR_EXISTS(info.min)) stored.origin[axis] = info.min + (cells ? stored.spacing[axis] / 2 : 0);
     }
 }
 
@@ -282,6 +300,11 @@ void take_geometry(StoredVolume& stored, const Parsed& parsed, std::vector<std::
     if (space == nrrdSpaceLeftAnteriorSuperior || space == nrrdSpace3DLeftHanded)
         notes.push_back(
             fmt::format("{}: its space is left-handed; pictures show its mirror image", stored.where));
+    if (space == nrrdSpaceRightAnteriorSuperior || space == nrrdSpaceRightAnteriorSuperiorTime)
+        notes.push_back(fmt::format(
+            "{}: its space is right-anterior-superior and its axes are kept; those of DICOM, which are "
+            "left-posterior-superior, show it turned by half a turn about z",
+            stored.where));
 }
 
 /// Units and bits that save_nrrd kept.
@@ -331,6 +354,9 @@ class Inflater {
     Inflater(const Inflater&) = delete;
     Inflater& operator=(const Inflater&) = delete;
 
+    /// Whether the last member came to its end, its checksum and length right.
+    bool whole() const { return whole_; }
+
     /// Bytes written: fewer than `room` only where the data end.
     std::size_t read(unsigned char* out, std::size_t room) {
         std::size_t done = 0;
@@ -362,7 +388,7 @@ class Inflater {
     }
     void end_of_member() {
         const bool another = left_ >= 2 && next_[0] == 0x1f && next_[1] == 0x8b;
-        ended_ = !another;
+        ended_ = whole_ = !another;
         if (another) inflateReset(&stream_);
     }
 
@@ -370,7 +396,7 @@ class Inflater {
     const unsigned char* next_;
     std::size_t left_;
     std::string where_;
-    bool ended_ = false;
+    bool ended_ = false, whole_ = false;
 };
 
 void take_inflated(StoredVolume& stored, const MappedFile& file, std::size_t offset, std::size_t skip,
@@ -399,6 +425,10 @@ void take_inflated(StoredVolume& stored, const MappedFile& file, std::size_t off
         throw InputError(fmt::format("{}: {} bytes of voxels, but {}", where, got, needs(stored)));
     if (inflater.read(scratch, 1) != 0)
         throw InputError(fmt::format("{}: more than {} bytes of voxels, but {}", where, size, needs(stored)));
+    if (!inflater.whole())
+        throw InputError(fmt::format(
+            "{}: gzip data end before their checksum: the file is cut short, compress or copy it anew",
+            where));
 }
 
 void take_data(StoredVolume& stored, const Parsed& parsed, const MappedFile& file, std::size_t start,

@@ -82,15 +82,16 @@ Volume load_procedural(const VolumeSource& source, const LoadLimits& limits) {
     Index3 dims(given == 0 ? field->default_size : source.dims[0]);
     if (given == 3) dims = {source.dims[0], source.dims[1], source.dims[2]};
     const int bits = source.bits != 0 ? source.bits : field->default_bits;
-    if (!std::isfinite(source.value_scale) || source.value_scale == 0 || !std::isfinite(source.value_offset))
+    const double scale = source.value_scale.value_or(1), offset = source.value_offset.value_or(0);
+    if (!std::isfinite(scale) || scale == 0 || !std::isfinite(offset))
         throw InputError(
             fmt::format("{}: value scale is {} and offset {}, but both must be finite and the scale not 0",
-                        name, source.value_scale, source.value_offset));
+                        name, scale, offset));
     StoredVolume size;
     size.where = name, size.dims = dims;
     check_memory(checked_bytes(dims, bits <= 8 ? 1 : 2, name), size, limits);
     Volume volume = make_procedural(*field, dims, bits, spacing_of(source, name, {1, 1, 1}));
-    volume.value_scale = source.value_scale, volume.value_offset = source.value_offset;
+    volume.value_scale = scale, volume.value_offset = offset;
     return volume;
 }
 

@@ -20,9 +20,9 @@ struct VolumeSource {
     std::int64_t offset = 0;              // raw: bytes to skip
     std::vector<double> spacing = {};     // raw: default 1 1 1; otherwise overrides the file's
     std::vector<double> window = {};      // [least, greatest] in the file's units; required for f32
-    int bits = 0;            // float data: bits to quantise the window to (required there, 1 to 16)
-    double value_scale = 1;  // value = value_scale * stored + value_offset
-    double value_offset = 0;
+    int bits = 0;  // float data: bits to quantise the window to (required there, 1 to 16)
+    /// value = value_scale * stored + value_offset; absent: what the file declares, or 1 and 0.
+    std::optional<double> value_scale = {}, value_offset = {};
 };
 
 struct LoadLimits {

@@ -148,11 +148,8 @@ struct Values {
 };
 
 Values settle(const StoredVolume& stored, const VolumeSource& source) {
-    Values values{source.value_scale, source.value_offset};
-    if (values.scale == 1 && values.offset == 0) {
-        values.scale = stored.value_scale.value_or(1);
-        values.offset = stored.value_offset.value_or(0);
-    }
+    Values values{source.value_scale.value_or(stored.value_scale.value_or(1)),
+                  source.value_offset.value_or(stored.value_offset.value_or(0))};
     if (!std::isfinite(values.scale) || values.scale == 0 || !std::isfinite(values.offset))
         throw InputError(
             fmt::format("{}: value scale is {} and offset {}, but both must be finite and the scale not 0",
@@ -291,6 +288,55 @@ void choose_bits(Volume& volume, const StoredVolume& stored, const Values& value
         volume.type == ScalarType::u8 && values.bits == 0 ? 8 : std::max(at_least, bits_for(largest));
 }
 
+/// Of the scalars but the least or the greatest: where they end, and how many voxels are left out.
+struct Rest {
+    std::uint32_t smallest = std::numeric_limits<std::uint32_t>::max(), largest = 0;
+    std::int64_t at_smallest = 0, at_largest = 0;  // voxels of the volume's least and greatest scalar
+};
+
+Rest rest_of(const Volume& volume) {
+    const auto* scalars = static_cast<const std::uint16_t*>(volume.data.get());
+    return tbb::parallel_reduce(
+        tbb::blocked_range<std::int64_t>(0, volume.voxels(), 1 << 18), Rest{},
+        [&](const auto& range, Rest rest) {
+            for (std::int64_t i = range.begin(); i < range.end(); ++i) {
+                const std::uint32_t s = scalars[i];
+                rest.at_smallest += s == volume.smallest, rest.at_largest += s == volume.largest;
+                if (s != volume.smallest) rest.smallest = std::min(rest.smallest, s);
+                if (s != volume.largest) rest.largest = std::max(rest.largest, s);
+            }
+            return rest;
+        },
+        [](const Rest& a, const Rest& b) {
+            return Rest{std::min(a.smallest, b.smallest), std::max(a.largest, b.largest),
+                        a.at_smallest + b.at_smallest, a.at_largest + b.at_largest};
+        });
+}
+
+/// A value that stands apart from all others (what scanners fill up with) makes entries of several levels.
+void note_padding(const Volume& volume, const Values& values, std::vector<std::string>& notes) {
+    constexpr std::uint32_t kEntries = 4096;
+    constexpr std::uint32_t kApart = 4;  // a part of the range as large as this is no chance
+    const std::uint32_t range = volume.largest - volume.smallest;
+    if (values.windowed || volume.type != ScalarType::u16 || range < kEntries) return;
+    const Rest rest = rest_of(volume);
+    if (rest.smallest > rest.largest) return;
+    const std::uint32_t below = rest.smallest - volume.smallest, above = volume.largest - rest.largest;
+    const bool low = below >= above;
+    if (std::max(below, above) < range / kApart) return;
+    const std::uint32_t padding = low ? volume.smallest : volume.largest,
+                        first = low ? rest.smallest : volume.smallest,
+                        last = low ? volume.largest : rest.largest;
+    if (first >= last) return;
+    const auto [least, greatest] = std::minmax(volume.value_at(first), volume.value_at(last));
+    notes.push_back(
+        fmt::format("{}: {} voxels are {}, apart from all others ({} to {}): a padding value makes the "
+                    "transfer function's "
+                    "entries coarser; volume.window = [{}, {}] leaves it out",
+                    volume.name, low ? rest.at_smallest : rest.at_largest, volume.value_at(padding), least,
+                    greatest, least, greatest));
+}
+
 }  // namespace
 
 std::size_t bytes_of(StoredType type) {
@@ -327,6 +373,7 @@ Volume levels_from_stored(const StoredVolume& stored, const VolumeSource& source
         shift_integers(volume, stored, values, limits, notes);
         measure(volume);
         choose_bits(volume, stored, values);
+        note_padding(volume, values, notes);
     }
     return volume;
 }

@@ -226,6 +226,103 @@ TEST_F(Nrrd, AxisMinsAreTheOrigin) {
     EXPECT_EQ(cells.origin, Vec3(2, 3, 4));
 }
 
+TEST_F(Nrrd, MinsAndMaxsAreSpacingsBetweenCellFacesOrNodes) {
+    const auto with = [&](const std::string& more) {
+        return load_path(file("a.nrrd", Header{.more = more}.text() + k24Bytes));
+    };
+    const std::string ends = "axis mins: 1 2 3\naxis maxs: 13 8 7\n";
+    const Volume cells = with(ends);
+    EXPECT_EQ(cells.spacing, Vec3(3, 2, 2)) << "as teem has it where the file does not say";
+    EXPECT_EQ(cells.origin, Vec3(2.5, 3, 4));
+    EXPECT_EQ(with(ends + "centers: cell cell cell\n").origin, cells.origin);
+    const Volume nodes = with(ends + "centers: node node node\n");
+    EXPECT_EQ(nodes.spacing, Vec3(4, 3, 4));
+    EXPECT_EQ(nodes.origin, Vec3(1, 2, 3));
+    EXPECT_EQ(with(ends + "spacings: 3 2 2\n").spacing, Vec3(3, 2, 2));
+
+    const auto refused = [&](const std::string& more) {
+        return refusal_of(file("a.nrrd", Header{.more = more}.text() + k24Bytes));
+    };
+    EXPECT_EQ(refused(ends + "spacings: 3 2 1\n"),
+              "a.nrrd: axis 2 has spacing 1, but its min and max make it 2");
+    EXPECT_THAT(refused("axis maxs: 13 8 7\n"), HasSubstr("axis 0 runs from nan to 13"));
+    EXPECT_THAT(refused("axis mins: 1 2 3\naxis maxs: 13 2 7\n"), HasSubstr("axis 1 runs from 2 to 2"));
+    EXPECT_EQ(refusal_of(file("b.nrrd",
+                              Header{.sizes = "24 1 1",
+                                     .more = "axis mins: 0 0 0\naxis maxs: 1 1 1\ncenters: node node node\n"}
+                                      .text() +
+                                  k24Bytes)),
+              "b.nrrd: axis 1 has one node, but axis mins and axis maxs need two");
+}
+
+TEST_F(Nrrd, ASpaceThatIsNotDicomsIsNoted) {
+    const std::string directions = "space directions: (1,0,0) (0,1,0) (0,0,1)\n";
+    const auto notes = [&](const std::string& space) {
+        return notes_of({.file = file("a.nrrd", Header{.more = "space: " + space + "\n" + directions}.text() +
+                                                    k24Bytes)});
+    };
+    EXPECT_THAT(notes("right-anterior-superior"), ElementsAre(HasSubstr("turned by half a turn about z")));
+    EXPECT_THAT(notes("left-posterior-superior"), IsEmpty());
+}
+
+TEST_F(Nrrd, GzipDataCutBeforeTheirChecksumAreRefused) {
+    const std::string packed = gzip(k24Bytes);
+    for (std::size_t cut = 1; cut <= 8; ++cut)
+        EXPECT_EQ(
+            refusal_of(
+                file("a.nrrd", Header{.encoding = "gzip"}.text() + packed.substr(0, packed.size() - cut))),
+            "a.nrrd: gzip data end before their checksum: the file is cut short, compress or copy it anew")
+            << cut;
+    std::string wrong = packed;
+    wrong[wrong.size() - 5] ^= 1;
+    EXPECT_THAT(refusal_of(file("a.nrrd", Header{.encoding = "gzip"}.text() + wrong)), HasSubstr("damaged"));
+    const std::string two = gzip(k24Bytes.substr(0, 7)) + gzip(k24Bytes.substr(7));
+    EXPECT_THAT(refusal_of(file("a.nrrd", Header{.encoding = "gzip"}.text() + two.substr(0, two.size() - 3))),
+                HasSubstr("before their checksum"));
+}
+
+TEST_F(Nrrd, APaddingValueIsNotedWithTheWindowThatLeavesItOut) {
+    std::vector<std::int16_t> values(24, 0);
+    for (std::size_t i = 0; i < 24; ++i) values[i] = static_cast<std::int16_t>(i * 100 - 1000);
+    const auto notes = [&](const VolumeSource& how = {}) {
+        VolumeSource source = how;
+        source.file = file("a.nrrd", Header{.type = "short"}.text() + bytes_of_values(values));
+        return notes_of(source);
+    };
+    EXPECT_THAT(notes(), IsEmpty());
+    values[3] = values[4] = -32768;
+    EXPECT_THAT(notes(),
+                ElementsAre(AllOf(HasSubstr("2 voxels are -32768, apart from all others (-1000 to 1300)"),
+                                  HasSubstr("volume.window = [-1000, 1300] leaves it out"))));
+    EXPECT_THAT(notes({.window = {-1000, 1300}}), ElementsAre(HasSubstr("were clamped")));
+    values[3] = values[4] = 32767;
+    EXPECT_THAT(notes(), ElementsAre(HasSubstr("2 voxels are 32767")));
+    values[3] = -2000, values[4] = -2000;
+    EXPECT_THAT(notes(), IsEmpty()) << "entries of one level";
+}
+
+TEST_F(Nrrd, UnitsOfTheSceneWinOverTheFilesEachForItself) {
+    const std::string path = file(
+        "a.nrrd", Header{.more = "squint value scale:=2\nsquint value offset:=-100\n"}.text() + k24Bytes);
+    const auto units = [&](const VolumeSource& source) {
+        const Volume volume = load(source);
+        return std::pair(volume.value_scale, volume.value_offset);
+    };
+    EXPECT_EQ(units({.file = path}), std::pair(2.0, -100.0));
+    EXPECT_EQ(units({.file = path, .value_scale = 1, .value_offset = 0}), std::pair(1.0, 0.0));
+    EXPECT_EQ(units({.file = path, .value_scale = 1}), std::pair(1.0, -100.0));
+    EXPECT_EQ(units({.file = path, .value_offset = 0}), std::pair(2.0, 0.0));
+}
+
+TEST_F(Nrrd, BytesOfAFileNeverReachAMessage) {
+    const std::string message = refusal_of(file("a.nrrd",
+                                                "NRRD\x9b"
+                                                "31mX\n\n"));
+    EXPECT_EQ(message, "a.nrrd: NRRD header: version is \"NRRD?31mX\", but NRRD0001 to NRRD0005 are allowed");
+    EXPECT_THAT(refusal_of(file("a.nhdr", Header{.more = "data file: \xc3\xbc/../\x1b\n"}.text())),
+                HasSubstr("data file is \"\\u00FC/../?\""));
+}
+
 TEST_F(Nrrd, ALeftHandedSpaceIsNoted) {
     const std::string more = "space: left-anterior-superior\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n";
     EXPECT_THAT(notes_of({.file = file("a.nrrd", Header{.more = more}.text() + k24Bytes)}),
@@ -372,7 +469,7 @@ TEST_F(Nrrd, RefusesLinksThatLeadOutOfTheHeadersFolder) {
         EXPECT_THAT(with(name), HasSubstr("only files in the header's own folder or below are allowed"));
     EXPECT_EQ(with("out.raw"),
               "sub/a.nhdr: data file is \"out.raw\", a link to elsewhere, but only files in the header's own "
-              "folder or below are allowed");
+              "folder or below are allowed: put the header beside the file that the link leads to");
     EXPECT_EQ(with("in.raw"), "no refusal");
     EXPECT_EQ(with("up/sub/in.raw"), "no refusal");  // and back again
     EXPECT_THAT(with("broken.raw"), HasSubstr("sub/broken.raw: cannot read: No such file or directory"));
