@@ -226,6 +226,16 @@ class Reader {
         if (file_.empty() && !setting.empty()) forget_rivals(key, "list");
     }
 
+    void assign(const TomlValue& value, std::string_view key, ValueRange& setting) {
+        ValueRange range;
+        range.of_data = value.kind == Kind::string && value.text == "data";
+        for (const TomlValue& item : value.items) range.ends.push_back(item.number);
+        const bool two = range.ends.size() == 2 && are_numbers(value, key) && range.ends[0] < range.ends[1];
+        if (!range.of_data && (value.kind != Kind::list || (!two && !range.ends.empty())))
+            refuse(value, key, described(value), allowed_text<ValueRange>(key));
+        setting = std::move(range);
+    }
+
     bool is_number(const TomlValue& value, std::string_view key) const {
         return (value.kind == Kind::integer || value.kind == Kind::number) && std::isfinite(value.number) &&
                limits_of(key).hold(value.number);
@@ -293,7 +303,10 @@ class Reader {
         if (given.empty()) return;
         if (key == "volume.procedural") scene_.volume.file.clear();
         if (key == "volume.file") scene_.volume.procedural.clear();
-        if (!key.starts_with("transfer_function.") || key.ends_with("color_space")) return;
+        const auto beside = {"transfer_function.color_space", "transfer_function.map"};
+        if (!key.starts_with("transfer_function.") ||
+            std::find(beside.begin(), beside.end(), key) != beside.end())
+            return;
         auto& tf = scene_.transfer_function;
         const std::string_view name = key.substr(key.find('.') + 1);
         if (name != "points") tf.points.clear();
@@ -303,7 +316,8 @@ class Reader {
         // A preset and a .vp file bring their own unit_distance: one that was given for another function is
         // not theirs.
         const auto unit = scene_.given_at.find("transfer_function.unit_distance");
-        if ((name == "preset" || given.ends_with(".vp")) &&
+        if (name != "file" || function_file(given) != FunctionFile::paraview) tf.map.clear();
+        if ((name == "preset" || brings_unit_distance(function_file(given))) &&
             (unit == scene_.given_at.end() || unit->second != "--set"))
             tf.unit_distance = 0;
     }
@@ -339,10 +353,14 @@ void check_transfer_function(const Scene& scene) {
     if (tf.color.empty() != tf.opacity.empty())
         refuse(scene, tf.color.empty() ? "transfer_function.opacity" : "transfer_function.color",
                tf.color.empty() ? "no color" : "no opacity", "color and opacity together");
-    if (!tf.file.empty() && !tf.file.ends_with(".json") && !tf.file.ends_with(".vp"))
+    if (!tf.file.empty() && function_file(tf.file) == FunctionFile::unknown)
         refuse(scene, "transfer_function.file", in_quotes(tf.file),
-               "a ParaView colour map (.json) or a Slicer volume property (.vp)");
-    const bool brings_unit = !tf.preset.empty() || tf.file.ends_with(".vp");
+               "a ParaView colour map (.json), a Slicer volume property (.vp, .vp.json) or an ImageVis3D "
+               "function "
+               "(.1dt)");
+    if (!tf.map.empty() && function_file(tf.file) != FunctionFile::paraview)
+        refuse(scene, "transfer_function.map", in_quotes(tf.map), "a name beside a ParaView file (.json)");
+    const bool brings_unit = !tf.preset.empty() || brings_unit_distance(function_file(tf.file));
     if (tf.unit_distance == 0 && !brings_unit)
         refuse(scene, "transfer_function.unit_distance",
                scene.given_at.contains("transfer_function.unit_distance") ? "0" : "none",
@@ -387,7 +405,7 @@ void apply_override(Scene& scene, const std::string& text) {
         value = whole.items[0];
     } catch (const InputError& error) {
         // A bare word or a path; what begins like TOML is meant as TOML.
-        const auto plain = [](char c) { return c >= 0x20 && c <= 0x7e; };
+        const auto plain = [](char c) { return static_cast<unsigned char>(c) >= 0x20 && c != 0x7f; };
         if (std::string_view("[{\"'").find(written[0]) != std::string_view::npos ||
             !std::all_of(written.begin(), written.end(), plain))
             throw InputError(

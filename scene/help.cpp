@@ -49,13 +49,13 @@ value given last wins:
 
 - Values on the command line are written as in TOML; a bare word or a path needs no quotes. A list or a table works too:
   `--set 'lights=[{headlight=true}]'`. Of settings that exclude each other (`volume.file` and `volume.procedural`; the ways to
-  give a transfer function) the one given last replaces the others. A preset or a `.vp` file then brings its own
+  give a transfer function) the one given last replaces the others. A preset or Slicer's file then brings its own
   `unit_distance`, unless one was given with `--set` before it.
 - `"auto"` takes a setting without a default below back to what it is when left out.
 - Paths (`volume.file`, `transfer_function.file`, `precision.preset`) are relative to the scene file's folder, also when given
   on the command line; without a scene file they are relative to the current folder. `${NAME}` is replaced from the
   environment. Records keep the path as written.
-- A file holds printable ASCII, tabs and line breaks; other characters are written `\u00e9` in strings.
+- A file is UTF-8 without control characters but tabs and line breaks.
 - An error is one line: `head.toml:7:1: unknown setting "sampel"; did you mean "sample"?`
 
 What the words mean is in the pages on the pipeline; the least scene is this:
@@ -76,7 +76,7 @@ constexpr std::pair<std::string_view, std::string_view> kSections[] = {
      "units (HU for CT where "
      "declared). Colour and alpha are linear between points and constant outside. `unit_distance` is "
      "required, but for "
-     "presets and `.vp` files, which bring one; 0 stands for theirs."},
+     "presets and Slicer's files (`.vp`, `.vp.json`), which bring one; 0 stands for theirs."},
     {"camera", "What is left out is chosen so that the whole volume is in the picture."},
     {"image", ""},
     {"sampling", ""},

@@ -75,6 +75,8 @@ std::string allowed_text(std::string_view key) {
         return (key.ends_with("color") || key.ends_with("background") ? "three numbers [r, g, b]"
                                                                       : "three numbers [x, y, z]") +
                limits;
+    } else if constexpr (std::is_same_v<T, ValueRange>) {
+        return "two numbers, the first below the second, \"data\", or [] for none";
     } else if constexpr (std::is_same_v<T, std::vector<std::vector<double>>>) {
         return key == "transfer_function.points"
                    ? "a list of [value, r, g, b, alpha], values ascending, the rest from 0 to 1"

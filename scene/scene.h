@@ -58,15 +58,23 @@ constexpr std::string_view name_of(E value) {
     return EnumNames<E>::names[static_cast<std::size_t>(value)];
 }
 
+/// Two values, the first below the second; or the least and the greatest of the data; or nothing.
+struct ValueRange {
+    std::vector<double> ends;  // two, or none
+    bool of_data = false;
+};
+
 struct TransferFunctionSettings {
     std::vector<std::vector<double>> points;   // [value, r, g, b, alpha]
     std::vector<std::vector<double>> color;    // [value, r, g, b]
     std::vector<std::vector<double>> opacity;  // [value, alpha]
     std::string preset;                        // CT in HU, or one of the built-in scene's own
-    std::string file;                          // ParaView .json or Slicer .vp
+    std::string file;                          // of another program: see FunctionFile
+    std::string map;                           // its name in a ParaView file of several
     std::string color_space = "linear";        // or "srgb"
     double unit_distance = 0;                  // required with points or a ParaView file
     int entries = 0;                           // 0: one per level, at most 4096
+    ValueRange range;                          // where the points are stretched to
 };
 
 struct ImageSettings {
@@ -169,18 +177,26 @@ void visit_scene(S& scene, V&& visit) {
     visit("volume.spacing", volume.spacing, "world units between voxels along x, y, z; overrides the file's");
     visit("volume.window", volume.window, "[least, greatest] stored value kept; required for float data");
     visit("volume.bits", volume.bits, "float and procedural data: bits the values are quantised to");
-    visit("volume.scale", volume.value_scale, "value = scale * stored + offset, in the file's units (HU)");
-    visit("volume.value_offset", volume.value_offset, "see scale");
+    visit("volume.scale", volume.value_scale,
+          "value = scale * stored + value_offset, in the file's units (HU); default: what the file declares, "
+          "or "
+          "1");
+    visit("volume.value_offset", volume.value_offset, "see scale; default: what the file declares, or 0");
     auto& tf = scene.transfer_function;
     visit("transfer_function.points", tf.points, "list of [value, r, g, b, alpha], values ascending");
     visit("transfer_function.color", tf.color, "list of [value, r, g, b]; with opacity, instead of points");
     visit("transfer_function.opacity", tf.opacity, "list of [value, alpha]");
     visit("transfer_function.preset", tf.preset, "built-in function by name: ct_bone, ct_skin, ...");
-    visit("transfer_function.file", tf.file, "ParaView .json colour map or Slicer .vp");
+    visit("transfer_function.file", tf.file,
+          "ParaView .json colour map, Slicer .vp or .vp.json, ImageVis3D .1dt");
+    visit("transfer_function.map", tf.map, "of a .json file that holds several: the name of the colour map");
     visit("transfer_function.color_space", tf.color_space, "linear, or srgb: colours are decoded first");
     visit("transfer_function.unit_distance", tf.unit_distance,
           "world units of matter that an alpha is given for (required)");
     visit("transfer_function.entries", tf.entries, "samples of the function; 0: one per level, at most 4096");
+    visit("transfer_function.range", tf.range,
+          "values that the first and the last point are moved to, the others between them in proportion; "
+          "\"data\": the least and the greatest in the volume; []: left where they are");
     auto& camera = scene.camera;
     visit("camera.projection", camera.projection, "orthographic or perspective");
     visit("camera.eye", camera.eye, "world position; overrides azimuth and elevation");
@@ -289,8 +305,15 @@ std::string scene_help();
 /// docs/scene.md: every key with its default, what is allowed and what it means.
 std::string scene_reference_markdown();
 
-/// The scene's transfer function, from points, preset or file.  Throws InputError.
-TransferFunction resolve_transfer_function(const Scene& scene);
+/// The scene's transfer function, from points, preset or file, stretched to `range` over the volume's values.
+/// Throws InputError.
+TransferFunction resolve_transfer_function(const Scene& scene, const Volume& volume);
+/// What a file of a transfer function is, by the end of its name.  Slicer's bring a unit distance.
+enum class FunctionFile { paraview, slicer_text, slicer_json, imagevis3d, unknown };
+FunctionFile function_file(std::string_view name);
+inline bool brings_unit_distance(FunctionFile file) {
+    return file == FunctionFile::slicer_text || file == FunctionFile::slicer_json;
+}
 /// Names that `transfer_function.preset` knows: those of CT in HU, and `phantom` for the built-in volume.
 std::vector<std::string> transfer_function_presets();
 

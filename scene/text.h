@@ -43,6 +43,10 @@ std::string text_of(const std::optional<T>& value) {
     return value ? text_of(*value) : "\"auto\"";
 }
 
+inline std::string text_of(const ValueRange& range) {
+    return range.of_data ? toml_text(std::string_view("data")) : text_of(range.ends);
+}
+
 inline std::string text_of(const Light& light) {
     std::string text;
     visit_light(light, [&](std::string_view name, const auto& setting, std::string_view) {

@@ -7,6 +7,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <tuple>
+
 namespace squint {
 namespace {
 
@@ -44,11 +47,52 @@ TransferFunction from_file(const Scene& scene) {
     const auto& settings = scene.transfer_function;
     const std::string path = expand_path(settings.file, scene.folder, where(scene, "transfer_function.file"));
     const bool srgb = settings.color_space == "srgb";
-    return settings.file.ends_with(".vp") ? import_slicer_vp(path, srgb)
-                                          : import_paraview_json(path, srgb, settings.unit_distance);
+    switch (function_file(settings.file)) {
+        case FunctionFile::slicer_text:
+            return import_slicer_vp(path, srgb);
+        case FunctionFile::slicer_json:
+            return import_slicer_json(path, srgb);
+        case FunctionFile::imagevis3d:
+            return import_imagevis3d(path, srgb, settings.unit_distance);
+        case FunctionFile::paraview:
+        case FunctionFile::unknown:
+            break;
+    }
+    return import_paraview_json(path, settings.map, srgb, settings.unit_distance);
+}
+
+/// Moves the first and the last of all points to the ends of the scene's range.
+void stretch(TransferFunction& function, const Scene& scene, const Volume& volume) {
+    const ValueRange& range = scene.transfer_function.range;
+    if (!range.of_data && range.ends.empty()) return;
+    double low = 0, high = 0;
+    if (range.of_data)
+        std::tie(low, high) = std::minmax(volume.value_at(volume.smallest), volume.value_at(volume.largest));
+    else
+        low = range.ends[0], high = range.ends[1];
+    const double first = std::min(function.color.front().value, function.opacity.front().value),
+                 last = std::max(function.color.back().value, function.opacity.back().value);
+    const std::string at = where(scene, "transfer_function.range");
+    if (!(first < last))
+        throw InputError(
+            fmt::format("{}: all points stand at {}; allowed: points at two values or more", at, first));
+    if (!(low < high))
+        throw InputError(
+            fmt::format("{}: every voxel is {}; allowed: two numbers, the first below the second", at, low));
+    const double scale = (high - low) / (last - first);
+    const auto moved = [&](double value) { return value == last ? high : low + (value - first) * scale; };
+    for (ColorPoint& point : function.color) point.value = moved(point.value);
+    for (OpacityPoint& point : function.opacity) point.value = moved(point.value);
 }
 
 }  // namespace
+
+FunctionFile function_file(std::string_view name) {
+    if (name.ends_with(".vp.json")) return FunctionFile::slicer_json;
+    if (name.ends_with(".vp")) return FunctionFile::slicer_text;
+    if (name.ends_with(".json")) return FunctionFile::paraview;
+    return name.ends_with(".1dt") ? FunctionFile::imagevis3d : FunctionFile::unknown;
+}
 
 std::vector<std::string> transfer_function_presets() {
     std::vector<std::string> names = transfer_preset_names();
@@ -56,7 +100,7 @@ std::vector<std::string> transfer_function_presets() {
     return names;
 }
 
-TransferFunction resolve_transfer_function(const Scene& scene) {
+TransferFunction resolve_transfer_function(const Scene& scene, const Volume& volume) {
     const auto& settings = scene.transfer_function;
     std::string_view key = "transfer_function.points";
     TransferFunction function;
@@ -71,6 +115,7 @@ TransferFunction resolve_transfer_function(const Scene& scene) {
     function.entries = settings.entries;
     function.name = where(scene, key);
     check(function);
+    stretch(function, scene, volume);
     return function;
 }
 

@@ -20,14 +20,13 @@ using namespace HWY_NAMESPACE;
 // -------------------------------------------------------------------------------------------- rays
 
 Vec3 clipped_low(const Plan& plan) {
-    Vec3 low = plan.volume->origin;
+    Vec3 low = plan.volume->box_low();
     if (const auto& clip = plan.scene.clip.low)
         for (int a = 0; a < 3; ++a) low[a] = std::max(low[a], (*clip)[a]);
     return low;
 }
 Vec3 clipped_high(const Plan& plan) {
-    Vec3 high = plan.volume->world_from_voxel(
-        Vec3(plan.volume->dims.x - 1.0, plan.volume->dims.y - 1.0, plan.volume->dims.z - 1.0));
+    Vec3 high = plan.volume->box_high();
     if (const auto& clip = plan.scene.clip.high)
         for (int a = 0; a < 3; ++a) high[a] = std::min(high[a], (*clip)[a]);
     return high;
@@ -187,7 +186,7 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
     plan.volume = std::move(volume);
     const Volume& v = *plan.volume;
     plan.camera = make_camera(scene.camera, v, scene.image.width, scene.image.height, frame);
-    plan.entries = sample_entries(resolve_transfer_function(scene), v);
+    plan.entries = sample_entries(resolve_transfer_function(scene, v), v);
     plan.step_world = scene.sampling.step * v.smallest_spacing();
     plan.box_low = clipped_low(plan), plan.box_high = clipped_high(plan);
     if (most_steps(plan) > 16e6)
@@ -201,7 +200,7 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
     plan.real = rounds_nothing(precision.preset);
     plan.wants_depth = scene.output.depth;
     preset_specs(precision.preset, preset_inputs(plan), plan.specs);
-    apply_overrides(precision, plan.specs);
+    if (!plan.real) apply_overrides(precision, plan.specs);  // `real` has no formats to be given others
     report_stages(plan);
     StageInputs in{.scene = plan.scene,
                    .specs = plan.specs,
@@ -223,6 +222,7 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
     plan.skips_empty_space = transparent_is_identity(plan);
     warn_of_lost_fog(plan);
     choose_words(plan);
+    for (std::string& finding : findings_of(plan)) plan.warnings.push_back(std::move(finding));
     if (plan.real) set_active(plan, {});
     if (plan.float32) prepare_floats(plan);
     return plan;

@@ -40,7 +40,7 @@ void add_settings(Hasher& hasher, const Scene& scene, const Volume& volume,
     hasher.text(volume.content_hash);
     for (int a = 0; a < 3; ++a) number(volume.spacing[a]), number(volume.origin[a]);
     number(volume.value_scale), number(volume.value_offset), number(volume.scalar_bits);
-    const TransferFunction tf = resolve_transfer_function(scene);
+    const TransferFunction tf = resolve_transfer_function(scene, volume);
     hasher.number(tf.color.size());
     for (const ColorPoint& p : tf.color)
         number(p.value), number(p.color.x), number(p.color.y), number(p.color.z);
@@ -82,7 +82,7 @@ double color_above_alpha(const Image& image) {
 // With every colour white and no light, C + T is one at every sample; what rounding leaves of that.
 Json conservation(const Prepared& point, const RenderOptions& options) {
     Scene white = point.scene;
-    const TransferFunction tf = resolve_transfer_function(white);
+    const TransferFunction tf = resolve_transfer_function(white, *point.volume);
     white.transfer_function = {};
     white.transfer_function.color = {{0, 1, 1, 1}};
     for (const OpacityPoint& p : tf.opacity) white.transfer_function.opacity.push_back({p.value, p.alpha});

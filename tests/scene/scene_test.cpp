@@ -236,7 +236,9 @@ TEST(SceneFile, RefusesWhatOnlySeveralSettingsTogetherShow) {
 }
 
 TEST(SceneFile, RefusesBytesThatAreNotPlainText) {
-    EXPECT_THAT(refusal("# caf\xc3\xa9\n"), StartsWith("s.toml:4:6: found byte 0xc3; "));
+    EXPECT_THAT(refusal("# caf\xe9\n"), StartsWith("s.toml:4:6: found byte 0xe9; allowed: UTF-8"));
+    EXPECT_THAT(refusal("# caf\xc2\x9b\n"), StartsWith("s.toml:4:6: found byte 0xc2; "))
+        << "a control character of eight bits";
     EXPECT_THAT(refusal(std::string_view("a\0b", 3)), StartsWith("s.toml:4:2: found byte 0x00; "));
     EXPECT_THAT(refusal("a\rb"), StartsWith("s.toml:4:2: found byte 0x0d; "));
     EXPECT_EQ(refusal_of_file("[transfer_function]\nfile = 'a\tb.vp' \t# tab\r\n"), "accepted");
@@ -275,6 +277,29 @@ TEST(SceneOverrides, TakeBareWordsPathsListsAndTables) {
     EXPECT_EQ(scene.transfer_function.points[1][0], 9);
 }
 
+TEST(SceneFile, IsUtf8InStringsKeysAndComments) {
+    const std::string text =
+        "# caf\xc3\xa9\n[volume]\nfile = '\xe2\x82\xac/k\xc3\xb6pfe.nrrd'  # \xf0\x9f\x98\x80\n"
+        "[transfer_function]\nfile = \"\xc3\xbc @0: \\u00fc.vp\"\n";
+    const Scene scene = parse_scene(text, "s.toml", "");
+    EXPECT_EQ(scene.volume.file, "\xe2\x82\xac/k\xc3\xb6pfe.nrrd");
+    EXPECT_EQ(scene.transfer_function.file, "\xc3\xbc @0: \xc3\xbc.vp");
+    EXPECT_EQ(parse_scene("\xef\xbb\xbf" + text, "s.toml", "").volume.file, scene.volume.file)
+        << "after a byte order mark";
+    EXPECT_THAT(refusal("a = { '\xc3\xbc\xc3\xbc' = 1, b 2 }\n"), StartsWith("s.toml:4:19: not TOML: "))
+        << "columns count characters";
+    EXPECT_THAT(refusal("['\xc3\xbc']\n"), testing::HasSubstr("unknown setting \"\\u00FC\""));
+}
+
+TEST(SceneOverrides, TakePathsThatAreNotAscii) {
+    for (const std::string path : {"Pr\xc3\xbc"
+                                   "fung/k\xc3\xb6pfe.nrrd",
+                                   "latin-\xfc.nrrd"})
+        EXPECT_EQ(scene_with(built_in_scene(), {"volume.file=" + path}).volume.file, path);
+    EXPECT_EQ(scene_with(built_in_scene(), {"volume.file='k\xc3\xb6pfe.nrrd'"}).volume.file,
+              "k\xc3\xb6pfe.nrrd");
+}
+
 TEST(SceneOverrides, ReplaceSettingsThatExcludeThem) {
     const Scene preset = scene_of("", {"transfer_function.preset=phantom"});
     EXPECT_TRUE(preset.transfer_function.points.empty());
@@ -305,8 +330,10 @@ TEST(SceneOverrides, AreRefusedByTheirKey) {
     EXPECT_THAT(refusal("", {"image.width=3\nimage.height=4"}), StartsWith("--set image.width: found "));
     EXPECT_THAT(refusal("", {"precision.sample=u1.15 round"}),
                 StartsWith("--set precision.sample: found \"u1.15 round\"; allowed: a format"));
-    EXPECT_THAT(refusal("", {"volume.file=caf\xc3\xa9.nrrd"}),
-                StartsWith("--set volume.file: found \"caf\\u00E9.nrrd\""));
+    EXPECT_THAT(refusal("", {"volume.file=[caf\xc3\xa9"}),
+                StartsWith("--set volume.file: found \"[caf\\u00E9\", which is not"));
+    EXPECT_THAT(refusal("", {"volume.file=caf\x1b.nrrd"}),
+                StartsWith("--set volume.file: found \"caf\\u001B.nrrd\", which is not"));
 }
 
 // --- Texts that read back ------------------------------------------------------------------------
@@ -363,6 +390,10 @@ class RandomScenes {
             value = static_cast<I>(whole(key == "transfer_function.entries" ? 2 : 1, 5));
     }
     void fill(std::string_view, Vec3& value) { value = Vec3(number(), number(), number()); }
+    void fill(std::string_view, ValueRange& range) {
+        range.of_data = heads();
+        range.ends = range.of_data || heads() ? std::vector<double>{} : std::vector<double>{-number(), 1e9};
+    }
     void fill(std::string_view, std::vector<double>& list) { list = {number() + 1e-6, 1e-300, 12345678.9}; }
     void fill(std::string_view, std::vector<std::int64_t>& list) { list = {whole(1, 9), 1 << 30, 1}; }
     void fill(std::string_view, std::vector<std::vector<double>>&) {}  // see function()

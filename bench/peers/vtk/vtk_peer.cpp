@@ -91,7 +91,7 @@ struct VtkPeer::Parts {
     }
 
     void set_property() {
-        const TransferFunction function = resolve_transfer_function(plan.scene);
+        const TransferFunction function = resolve_transfer_function(plan.scene, *plan.volume);
         vtkNew<vtkColorTransferFunction> color;
         Levels color_level(*plan.volume), opacity_level(*plan.volume);
         for (const ColorPoint& p : function.color)
