@@ -1,20 +1,30 @@
 // squint number: a calculator in formats, for people (arguments) and for programs (a line an operation).
 #include "cli/common.h"
 #include "core/error.h"
+#include "core/text.h"
 #include "fixedpoint/calculator.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
+#include <cstdio>
 #include <iostream>
 #include <string>
 
 namespace squint::cli {
 namespace {
 
+bool any_operand_overflow(const Calculation& c) {
+    return std::find(c.operand_overflow.begin(), c.operand_overflow.end(), true) != c.operand_overflow.end();
+}
 std::string flags_of(const Calculation& c) {
-    if (c.inexact && c.overflow) return "inexact,overflow";
-    return c.inexact ? "inexact" : c.overflow ? "overflow" : "-";
+    std::string flags;
+    const auto add = [&](bool set, const char* name) {
+        if (set) flags += (flags.empty() ? "" : ",") + std::string(name);
+    };
+    add(c.inexact, "inexact"), add(c.overflow, "overflow"), add(any_operand_overflow(c), "operand-overflow");
+    return flags.empty() ? "-" : flags;
 }
 Exact value_of(const Calculation& c) {
     return {c.raw, c.spec.format.fraction_bits};
@@ -30,8 +40,9 @@ std::string for_people(const Calculation& c) {
     std::string text = fmt::format("{}\n", to_string(c.spec));
     for (std::size_t i = 0; i < c.operands.size(); ++i) {
         const Format& f = c.operand_formats[i];
-        text += fmt::format("  {:<8}{} = {} (raw {})\n", i == 0 ? c.operation : "", to_string(f),
-                            decimal({c.operands[i], f.fraction_bits}), c.operands[i]);
+        text += fmt::format("  {:<8}{} = {} (raw {}){}\n", i == 0 ? c.operation : "", to_string(f),
+                            decimal({c.operands[i], f.fraction_bits}), c.operands[i],
+                            c.operand_overflow[i] ? ": what was given lies outside the format" : "");
     }
     text += fmt::format("  raw     {}\n  hex     {}\n  bits    {}\n  value   {}\n", c.raw,
                         hex(c.raw, c.spec.format), bits(c.raw, c.spec.format), decimal(value_of(c)));
@@ -54,7 +65,8 @@ std::string as_json(const Calculation& c) {
                                 {"value", decimal(value_of(c))},
                                 {"error_last_bits", last_bits(c)},
                                 {"inexact", c.inexact},
-                                {"overflow", c.overflow}};
+                                {"overflow", c.overflow},
+                                {"operand_overflow", any_operand_overflow(c)}};
     return json.dump() + "\n";
 }
 
@@ -69,14 +81,23 @@ int run(const NumberArguments& a) {
         return kDone;
     }
     std::string line;
+    bool any_wrong = false;
     for (int number = 1; std::getline(std::cin, line); ++number) {
         if (const auto comment = line.find(" //"); comment != std::string::npos) line.resize(comment);
         if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
-        if (const std::string wrong = calculate({line}, c); !wrong.empty())
-            throw InputError(fmt::format("standard input:{}: {}", number, wrong));
+        // A line of standard output for each: the others are worth their answers.
+        if (const std::string wrong = calculate({line}, c); !wrong.empty()) {
+            any_wrong = true;
+            print(a.json ? nlohmann::ordered_json{{"error", printable(wrong)}}.dump() + "\n" : "error\n");
+            std::fputs(message_text(fmt::format("squint: standard input:{}: {}", number, wrong))
+                           .append("\n")
+                           .c_str(),
+                       stderr);
+            continue;
+        }
         print(a.json ? as_json(c) : for_programs(c));
     }
-    return kDone;
+    return any_wrong ? kUsage : kDone;
 }
 
 }  // namespace squint::cli

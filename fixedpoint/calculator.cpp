@@ -227,6 +227,7 @@ std::string calculate(const std::vector<std::string>& given, Calculation& out) {
         if (const std::string wrong = convert(words[at], operand); !wrong.empty()) return wrong;
         operands.push_back({operand.raw, spec.format.fraction_bits});
         c.operands.push_back(operand.raw), c.operand_formats.push_back(spec.format);
+        c.operand_overflow.push_back(operand.overflow);
     }
     if (operands.size() != operation->operands)
         return fmt::format("{}: {} operands, but it takes {}", operation->name, operands.size(),

@@ -20,8 +20,9 @@ struct Calculation {
     std::string operation;               // "" for a conversion, add, sub, mul, madd, lerp
     std::vector<std::int64_t> operands;  // raw, each in its own format
     std::vector<Format> operand_formats;
-    Exact exact;          // what would stand there without an end of bits
-    bool sticky = false;  // the exact value lies above `exact`, by less than its last bit
+    std::vector<bool> operand_overflow;  // the format's limits changed the operand as it was read
+    Exact exact;                         // what would stand there without an end of bits
+    bool sticky = false;                 // the exact value lies above `exact`, by less than its last bit
     std::int64_t raw = 0;
     bool inexact = false;   // rounding changed it
     bool overflow = false;  // the format's limits changed it

@@ -59,7 +59,7 @@ TEST_F(Verbs, PlanSaysWhatIsLeftOutAndWhy) {
 
 TEST_F(Verbs, PlanAsJsonNamesEveryWireWithItsFormat) {
     const auto plan = squint("plan --json --set 'precision.color=u1.9 trn'" + kSmall).json();
-    EXPECT_EQ(plan["schema"], "squint.plan/1");
+    EXPECT_EQ(plan["schema"], "squint.plan/2");
     EXPECT_EQ(plan["stages"].size(), 6u);
     EXPECT_EQ(plan["wires"]["color"]["format"], "u1.9");
     EXPECT_EQ(plan["wires"]["color"]["rounding"], "trn");
@@ -131,6 +131,10 @@ TEST_F(Verbs, NumberConvertsAndCalculates) {
     EXPECT_THAT(squint("number 'u1.15 trn' mul u1.15 0.7 u1.15 0.7").out, HasSubstr("raw     16056\n"));
     EXPECT_THAT(squint("number s1.2 -0.5").out, HasSubstr("raw     -2\n"));
     expect_refusal(squint("number u1.15 mul 0.7"), "mul: 1 operands, but it takes 2");
+    EXPECT_THAT(squint("number u1.15 mul 2.5 0.5").out,
+                AllOf(HasSubstr("what was given lies outside the format"), HasSubstr("operand-overflow")));
+    EXPECT_THAT(squint("number 's3.0 wrap' add 2 8").out, HasSubstr("flags   operand-overflow"));
+    EXPECT_THAT(squint("number u1.15 mul 1.5 0.5").out, Not(HasSubstr("operand-overflow")));
     expect_refusal(squint("number u99.15 1"), "'u99.15' is not a format");
 }
 
@@ -141,8 +145,9 @@ TEST_F(Verbs, NumberAnswersALineForEachOfStandardInput) {
     EXPECT_EQ(
         r.out,
         "22938 0x599a 0.101100110011010 0.70001220703125 +1.2207e-05 inexact\n64 0x40 .01000000 0.25 0 -\n");
-    const Outcome wrong = shell("printf 'u1.15 0.7\\nu1.15 zero\\n' | \"$SQUINT\" number");
+    const Outcome wrong = shell("printf 'u1.15 0.7\\nu1.15 zero\\nu1.15 1\\n' | \"$SQUINT\" number");
     EXPECT_EQ(wrong.code, 2);
+    EXPECT_THAT(wrong.out, AllOf(HasSubstr("inexact\nerror\n32768 "))) << "one line does not end a batch";
     EXPECT_THAT(wrong.err, HasSubstr("squint: standard input:2: 'zero' is not a number"));
 }
 
