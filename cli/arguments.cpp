@@ -99,11 +99,13 @@ void add_render(CLI::App& app, RenderArguments& a) {
         ->type_name("OUT.png");
     verb.add_option(
             "--json", a.json,
-            "Write a record of the picture (schema squint.render/1): time, samples, path, memory, hash")
+            "Write a record of the picture (schema squint.render/2): time, samples, path, memory, hash")
         ->type_name("FILE|-");
     verb.add_flag("--error", a.error,
                   "Measure the error against the same scene in double, and each stage's share");
     verb.add_flag("--reference", a.reference, "Measure the error against the exact integral along each ray");
+    verb.add_option("--reference-output", a.reference_output, "Write that integral's picture as EXR")
+        ->type_name("OUT.exr");
     verb.add_flag(
         "--audit", a.options.audit,
         "Count what every wire carried: least, greatest, inexact, underflowed to zero, saturated, wrapped");

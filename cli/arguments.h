@@ -22,6 +22,7 @@ struct SceneArguments {
 struct RenderArguments {
     SceneArguments scene;
     std::string output, preview, json;  // json: a file, or - for standard output
+    std::string reference_output;       // the reference itself, as EXR
     RenderOptions options;
     std::int64_t max_memory = 0;  // bytes; 0: no limit
     bool reference = false, error = false, quiet = false, scene_reference = false;

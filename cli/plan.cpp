@@ -157,7 +157,7 @@ Json json_of_plan(const Plan& plan) {
                           {"columns", t.columns},
                           {"bytes", t.bytes},
                           {"note", t.note}});
-    return {{"schema", "squint.plan/1"},
+    return {{"schema", "squint.plan/2"},
             {"version", version()},
             {"scene", json_of_scene(plan.scene)},
             {"volume", json_of(*plan.volume)},

@@ -2,6 +2,7 @@
 #include "cli/common.h"
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/text.h"
 #include "pipeline/record.h"
 #include "truth/reference.h"
 
@@ -9,6 +10,7 @@
 #include <unistd.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cmath>
@@ -135,6 +137,31 @@ struct Job {
     std::string output;  // as asked for, or the default
 };
 
+/// The exact integral, with the scene in its attributes but no formats: it has none.
+void write_reference(const Job& job, const Plan& plan, const Image& reference, int frame) {
+    Attributes attributes = exr_attributes(plan, frame);
+    std::erase_if(attributes, [](const auto& item) { return item.first.starts_with("squint.wire."); });
+    attributes["squint.reference"] = "the exact integral along each ray";
+    write_exr(reference, frame_path(job.arguments.reference_output, frame, job.scene.camera.turntable),
+              attributes);
+}
+
+/// A picture without matter, for which the plan has no reason, says so.
+std::vector<std::string> warnings_of(const Plan& plan, const Rendering& rendering) {
+    std::vector<std::string> warnings = plan.warnings;
+    const std::vector<float>& alpha = rendering.image.find("A")->values;
+    const auto empty = [](const std::string& warning) {
+        return warning.find("the picture is empty") != std::string::npos;
+    };
+    if (std::none_of(alpha.begin(), alpha.end(), [](float a) { return a > 0; }) &&
+        std::none_of(warnings.begin(), warnings.end(), empty))
+        warnings.push_back(rendering.statistics.rays == 0
+                               ? "the picture is empty: no ray meets the volume; see camera and clip"
+                               : "the picture is empty: no sample on its rays has an opacity above 0; see "
+                                 "transfer_function, clip and camera");
+    return warnings;
+}
+
 /// Renders, writes and reports one picture; returns its record.
 Json render_frame(const Job& job, int frame) {
     const RenderArguments& a = job.arguments;
@@ -156,11 +183,13 @@ Json render_frame(const Job& job, int frame) {
         options.progress = nullptr;
         bar.reset();
         if (a.error) errors = rounding_errors(plan, rendering.image, options, frame);
-        if (a.reference) {
+        if (a.reference || !a.reference_output.empty()) {
             ProgressBar second(!a.quiet);
             ReferenceOptions exact{.threads = options.threads, .cancelled = &interrupted};
             exact.progress = [&](double part) { second(part); };
-            errors.against_reference = compare_colors(rendering.image, render_reference(plan, exact));
+            const Image reference = render_reference(plan, exact);
+            if (a.reference) errors.against_reference = compare_colors(rendering.image, reference);
+            if (!a.reference_output.empty()) write_reference(job, plan, reference, frame);
         }
     }
     const int frames = job.scene.camera.turntable;
@@ -172,6 +201,7 @@ Json render_frame(const Job& job, int frame) {
         write_preview_png(rendering.image, png, background);
     }
     const bool measured = a.error || a.reference;
+    const std::vector<std::string> warnings = warnings_of(plan, rendering);
     if (!a.quiet) {
         const RenderStatistics& s = rendering.statistics;
         std::fputs(
@@ -184,14 +214,14 @@ Json render_frame(const Job& job, int frame) {
                         text_of_count(s.samples), text_of_count(s.rays), s.threads, s.threads == 1 ? "" : "s")
                 .c_str(),
             stderr);
-        for (const std::string& warning : plan.warnings)
-            std::fputs(fmt::format("  warning: {}\n", warning).c_str(), stderr);
+        for (const std::string& warning : warnings)
+            std::fputs(fmt::format("  warning: {}\n", message_text(warning)).c_str(), stderr);
         if (measured) std::fputs(error_text(errors).c_str(), stderr);
     }
     if (a.options.audit && a.json != "-") print(audit_text(plan, rendering.statistics));
     Json record = json_of(plan, rendering, measured ? &errors : nullptr, a.options.audit);
     record["frame"] = frame;
-    if (frame == 0) record["wires"] = json_of_wires(plan), record["warnings"] = plan.warnings;
+    if (frame == 0) record["wires"] = json_of_wires(plan), record["warnings"] = warnings;
     return record;
 }
 
@@ -207,6 +237,7 @@ int run(const RenderArguments& a) {
     const std::string output = a.output.empty() ? default_output(a) : a.output;
     check_output(output, "-o", ".exr");
     check_output(a.preview, "--preview", ".png");
+    check_output(a.reference_output, "--reference-output", ".exr");
     if (a.json != "-") check_output(a.json, "--json", nullptr);
 
     const Scene scene = read(a.scene);
@@ -219,12 +250,13 @@ int run(const RenderArguments& a) {
     std::vector<std::string> notes;
     const Job job{a, scene, load(scene, notes, a.max_memory), output};
     if (!a.quiet)
-        for (const std::string& note : notes) std::fputs(fmt::format("  note: {}\n", note).c_str(), stderr);
+        for (const std::string& note : notes)
+            std::fputs(fmt::format("  note: {}\n", message_text(note)).c_str(), stderr);
 
     Json pictures = Json::array();
     for (int frame = 0; frame < scene.camera.turntable; ++frame) pictures.push_back(render_frame(job, frame));
     if (a.json.empty()) return kDone;
-    Json record{{"schema", "squint.render/1"},
+    Json record{{"schema", "squint.render/2"},
                 {"version", version()},
                 {"scene", json_of_scene(scene)},
                 {"volume", json_of(*job.volume)},

@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <type_traits>
 
 namespace squint {
 namespace {
@@ -30,6 +31,38 @@ const StageReport* find_stage(const Plan& plan, std::string_view name) {
     for (const StageReport& stage : plan.stages)
         if (stage.name == name) return &stage;
     return nullptr;
+}
+
+template <class T>
+Json json_of_setting(const T& value);
+Json json_of_setting(const Vec3& v) {
+    return {v.x, v.y, v.z};
+}
+Json json_of_setting(const ValueRange& range) {
+    return range.of_data ? Json("data") : Json(range.ends);
+}
+Json json_of_setting(const Light& light) {
+    Json json = Json::object();
+    visit_light(light, [&](std::string_view name, const auto& setting, std::string_view) {
+        json[std::string(name)] = json_of_setting(setting);
+    });
+    return json;
+}
+Json json_of_setting(const std::vector<Light>& lights) {
+    Json json = Json::array();
+    for (const Light& light : lights) json.push_back(json_of_setting(light));
+    return json;
+}
+template <class T>
+Json json_of_setting(const std::optional<T>& value) {
+    return value ? json_of_setting(*value) : Json(nullptr);
+}
+template <class T>
+Json json_of_setting(const T& value) {
+    if constexpr (std::is_enum_v<T>)
+        return name_of(value);
+    else
+        return value;
 }
 
 struct SumTables {
@@ -183,7 +216,10 @@ Json json_of(const Volume& v) {
 
 Json json_of_scene(const Scene& scene) {
     Json json = Json::object();
-    for (const auto& [key, value] : resolved(scene)) json[key] = value;
+    visit_scene(scene, [&](std::string_view key, const auto& setting, std::string_view) {
+        if (key == "shading.model") json["lights"] = json_of_setting(scene.lights);
+        json[std::string(key)] = json_of_setting(setting);
+    });
     return json;
 }
 

@@ -4,6 +4,7 @@
 #include "pipeline/record.h"
 #include "studies/sweep/report_page.h"
 #include "studies/sweep/run.h"
+#include "studies/sweep/run_folder.h"
 
 #include <fmt/format.h>
 #include <zlib.h>
@@ -38,7 +39,7 @@ std::string quoted(const std::string& word) {  // for a shell
 std::string command_of(const Json& record) {
     std::string text = "squint render";
     if (const std::string scene = record.value("scene", ""); !scene.empty()) text += " " + quoted(scene);
-    const auto settings = record.at("settings").get<std::vector<std::string>>();
+    const auto settings = settings_of(record.at("settings"));
     const auto key = [](const std::string& setting) { return setting.substr(0, setting.find('=')); };
     for (std::size_t i = 0; i < settings.size(); ++i) {
         const bool again =

@@ -3,6 +3,7 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "pipeline/render.h"
+#include "scene/toml.h"
 #include "studies/sweep/run.h"
 
 #include <fmt/chrono.h>
@@ -79,6 +80,67 @@ Json sweep_record(const SweepFile& sweep, const std::vector<ListedPoint>& entrie
             {"points", points}};
 }
 
+namespace {
+Json json_of(const TomlValue& value) {
+    using Kind = TomlValue::Kind;
+    switch (value.kind) {
+        case Kind::integer:
+            return value.integer;
+        case Kind::number:
+            return value.number;
+        case Kind::boolean:
+            return value.flag;
+        case Kind::string:
+        case Kind::date:
+            return value.text;
+        case Kind::list:
+        case Kind::table:
+            break;
+    }
+    Json json = value.kind == Kind::list ? Json::array() : Json::object();
+    for (const TomlValue& item : value.items)
+        if (value.kind == Kind::list)
+            json.push_back(json_of(item));
+        else
+            json[item.key] = json_of(item);
+    return json;
+}
+std::string toml_of(const Json& json) {
+    if (json.is_string()) return toml_text(std::string_view(json.get_ref<const std::string&>()));
+    if (json.is_boolean()) return toml_text(json.get<bool>());
+    if (json.is_number_float()) return toml_text(json.get<double>());
+    if (json.is_number()) return toml_text(json.get<std::int64_t>());
+    std::string inside;
+    for (const auto& [key, item] : json.items())
+        inside += (inside.empty() ? "" : ", ") +
+                  (json.is_object() ? toml_text(std::string_view(key)) + " = " : std::string()) +
+                  toml_of(item);
+    return json.is_object() ? "{ " + inside + " }" : "[" + inside + "]";
+}
+}  // namespace
+
+Json settings_record(const std::vector<std::string>& settings) {
+    Json record = Json::object();
+    for (const std::string& setting : settings) {
+        const std::size_t equals = setting.find('=');
+        const std::string key = setting.substr(0, equals), text = setting.substr(equals + 1);
+        record.erase(key);  // the last stands last
+        try {
+            record[key] = json_of(parse_toml("v = " + text, "setting").items.at(0));
+        } catch (const InputError&) {
+            record[key] = text;  // a bare word
+        }
+    }
+    return record;
+}
+
+std::vector<std::string> settings_of(const Json& recorded) {
+    if (recorded.is_array()) return recorded.get<std::vector<std::string>>();
+    std::vector<std::string> settings;
+    for (const auto& [key, value] : recorded.items()) settings.push_back(key + '=' + toml_of(value));
+    return settings;
+}
+
 RecordState state_of(const std::string& path, const std::vector<std::string>& wanted) {
     std::error_code ignored;
     if (!fs::exists(path, ignored)) return RecordState::missing;
@@ -99,10 +161,10 @@ RecordState state_of(const std::string& path, const std::vector<std::string>& wa
 
 Json write_record(Evaluator& evaluator, const Prepared& point, const std::string& folder, int threads,
                   bool timed) {
-    Json record{{"schema", "squint.point/1"}, {"hash", point.hash}};
+    Json record{{"schema", "squint.point/2"}, {"hash", point.hash}};
     record.update(program_record());
     record["scene"] = point.scene_file;
-    record["settings"] = point.settings;
+    record["settings"] = settings_record(point.settings);
     record["measured"] = evaluator.wanted();
     std::string reason;
     try {

@@ -17,6 +17,11 @@ std::string point_path(const std::string& folder, const std::string& hash);
 /// JSON as every file of a run holds it.
 std::string dump(const Json& json);
 
+/// "key=value" settings, as TOML, of which the last of a key wins -> {key: typed value}, in the order given; and back,
+/// from an object (squint.point/2) or a list of such settings (squint.point/1).
+Json settings_record(const std::vector<std::string>& settings);
+std::vector<std::string> settings_of(const Json& recorded);
+
 /// Whether a record is there, whole, and holds all that is wanted; a failed one is as good as none.
 enum class RecordState { missing, reusable, other_program };
 RecordState state_of(const std::string& path, const std::vector<std::string>& wanted);

@@ -38,8 +38,12 @@ TEST_F(Render, WritesExrPreviewAndRecord) {
     EXPECT_EQ(png.width, 24);
     EXPECT_NE(exr.find("A"), nullptr);
     const auto record = nlohmann::json::parse(contents(folder / "a.json"));
-    EXPECT_EQ(record["schema"], "squint.render/1");
-    EXPECT_EQ(record["scene"]["image.width"], "24");
+    EXPECT_EQ(record["schema"], "squint.render/2");
+    EXPECT_EQ(record["scene"]["image.width"], 24);
+    EXPECT_EQ(record["scene"]["camera.eye"], nullptr);
+    EXPECT_EQ(record["scene"]["sampling.step"], 1.0);
+    EXPECT_EQ(record["scene"]["classification.method"], "pc");
+    EXPECT_TRUE(record["scene"]["lights"][0]["direction"].is_array());
     EXPECT_EQ(record["pictures"][0]["hash"].get<std::string>().size(), 32u);
 }
 
@@ -94,11 +98,11 @@ TEST_F(Render, TheValueGivenLastWins) {
             "--set transfer_function.preset=phantom --json - -q " +
             flags);
         EXPECT_EQ(r.code, 0) << r.err;
-        return r.json()["scene"]["image.width"].get<std::string>();
+        return r.json()["scene"]["image.width"].get<int>();
     };
-    EXPECT_EQ(width("--set image.height=4"), "10");
-    EXPECT_EQ(width("--set image.width=11 --size 12x4"), "12");
-    EXPECT_EQ(width("--size 12x4 --set image.width=11"), "11");
+    EXPECT_EQ(width("--set image.height=4"), 10);
+    EXPECT_EQ(width("--set image.width=11 --size 12x4"), 12);
+    EXPECT_EQ(width("--size 12x4 --set image.width=11"), 11);
 }
 
 TEST_F(Render, ATurntableNumbersItsPictures) {

@@ -65,8 +65,8 @@ TEST_F(SweepProgram, PrintsARecordALineAndRendersAgainToTheSameHash) {
     for (std::string line; std::getline(lines, line); ++count) {
         const Json record = Json::parse(line);
         std::string command = "render --json - -q";
-        for (const auto& setting : record["settings"])
-            command += " --set '" + setting.get<std::string>() + "'";
+        for (const auto& [key, value] : record["settings"].items())
+            command += " --set '" + key + "=" + value.dump() + "'";
         const Outcome again = squint(command);
         ASSERT_EQ(again.code, 0) << again.err;
         EXPECT_EQ(again.json()["pictures"][0]["hash"], record["picture_hash"]) << command;
