@@ -57,7 +57,9 @@ class Temporary {
     Temporary& operator=(const Temporary&) = delete;
 
     const char* path() const { return slot_->path; }
+    /// Its bytes reach the disk before its name does: a loss of power leaves the old file or the new one.
     int rename_to(const std::filesystem::path& target) {
+        if (const int error = sync()) return error;
         if (std::rename(path(), target.c_str()) != 0) return errno;
         slot_->live = false;
         return 0;
@@ -79,6 +81,13 @@ class Temporary {
             slot_->live = false;
             if (errno != EEXIST) return errno;
         }
+    }
+    int sync() const {
+        const int file = open(slot_->path, O_RDONLY | O_CLOEXEC);
+        if (file < 0) return errno;
+        const int error = fsync(file) == 0 || errno == EINVAL ? 0 : errno;  // EINVAL: this file system cannot
+        close(file);
+        return error;
     }
     void release() {
         slot_->live = false;

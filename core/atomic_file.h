@@ -8,7 +8,7 @@
 
 namespace squint {
 
-/// Calls `write(temporary_path)` (the temporary keeps the extension), then renames it to `path`.  On any
+/// Calls `write(temporary_path)` (the temporary keeps the extension), then syncs it and renames it to `path`.  On any
 /// failure, or when the process is interrupted (remove_temporaries), the temporary is removed.  Throws
 /// InputError naming `path` and the reason.
 void write_whole(const std::string& path, const std::function<void(const std::string&)>& write);
