@@ -29,6 +29,23 @@ class KeptPerVolume {
         return thing;
     }
 
+    /// The same without a lock while it is made: of threads that make it at once, one's is kept.
+    template <class Make, class Good>
+    std::shared_ptr<T> find_or_make(const Volume& volume, Make&& make, Good&& good) {
+        {
+            const std::lock_guard lock(mutex_);
+            if (const auto found = kept_.find(volume.data.get());
+                found != kept_.end() && !found->second.voxels.expired() &&
+                found->second.dims == volume.dims && good(*found->second.thing))
+                return found->second.thing;
+        }
+        const std::shared_ptr<T> thing = make();
+        const std::lock_guard lock(mutex_);
+        std::erase_if(kept_, [](const auto& item) { return item.second.voxels.expired(); });
+        kept_[volume.data.get()] = {volume.data, volume.dims, thing};
+        return thing;
+    }
+
   private:
     struct Kept {
         std::weak_ptr<const void> voxels;

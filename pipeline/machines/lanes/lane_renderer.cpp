@@ -1,5 +1,7 @@
 #include "pipeline/machines/lanes/lane_renderer.h"
 
+#include "pipeline/machines/lanes/kept.h"
+#include "pipeline/machines/lanes/kept_empty_space.h"
 #include "pipeline/machines/lanes/packet_loop.h"
 #include "pipeline/machines/lanes/targets.h"
 
@@ -98,11 +100,26 @@ bool may_be_met(const BlockBox& box, const EmptySpace* empty, const Index3& cell
     return false;
 }
 
-// MIP: a block changes a ray where its greatest scalar or any below can be seen.  Else no sample of it is the
-// ray's largest, or the largest is as transparent as whatever stands in its place.
-BlockRanges from_zero(BlockRanges ranges) {
-    std::fill(ranges.smallest.begin(), ranges.smallest.end(), std::uint16_t{0});
-    return ranges;
+// Builds the cells that rays may meet, unless the last call for this volume asked for the same ones.
+void build_cells(const std::shared_ptr<CellBlocks>& cells, const Volume& volume, const BlockBox& box,
+                 const std::shared_ptr<const EmptySpace>& empty) {
+    struct Built {
+        std::weak_ptr<CellBlocks> cells;
+        BlockBox box;
+        std::shared_ptr<const EmptySpace> empty;
+    };
+    static KeptPerVolume<Built> kept;
+    kept.find_or_make(
+        volume,
+        [&] {
+            cells->build(
+                [&](std::int64_t block) { return may_be_met(box, empty.get(), cells->blocks(), block); });
+            return std::make_shared<Built>(Built{cells, box, empty});
+        },
+        [&](const Built& built) {
+            return built.cells.lock() == cells && built.empty == empty && built.box.low == box.low &&
+                   built.box.blocks == box.blocks;
+        });
 }
 
 // What the system could give: pages of mapped files make way.
@@ -194,11 +211,8 @@ void LaneRenderer::find_empty() {
         no_room_to_skip_ = true;
         return;
     }
-    const std::shared_ptr<const BlockRanges> ranges = block_ranges(*plan_.volume, box);
-    const auto find = [&](const BlockRanges& r) {
-        return find_empty_space(r, plan_.entries, slab_reach(plan_), plan_.entry_reach);
-    };
-    empty_ = plan_.projection_mode ? find(from_zero(*ranges)) : find(*ranges);
+    empty_ = kept_empty_space(*plan_.volume, box, plan_.entries, slab_reach(plan_), plan_.entry_reach,
+                              plan_.projection_mode);
     room_ -= EmptySpace::bytes_for(empty_->box);
 }
 
@@ -223,10 +237,7 @@ void LaneRenderer::choose_layout(const RenderOptions& options) {
     const std::int64_t room = std::max<std::int64_t>(room_ - CellBlocks::table_bytes_of(volume), 0);
     cells_ = cell_blocks(volume, room, options.layout_bytes >= 0);
     if (cells_->room() > 0) {
-        const BlockBox box = blocks_met(plan_);
-        cells_->build([&](std::int64_t block) {
-            return may_be_met(box, empty_ ? &*empty_ : nullptr, cells_->blocks(), block);
-        });
+        build_cells(cells_, volume, blocks_met(plan_), empty_);
         voxels_.cells = cells_->data(), voxels_.blocks = cells_->blocks(), voxels_.slots = cells_->slots();
     }
     layout_ = fmt::format("cells: 2x2x2 voxels side by side, {:.1f} MiB if all were met, room for {:.1f} MiB",
@@ -263,7 +274,7 @@ void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& 
     const auto workspace = std::make_unique_for_overwrite<Workspace>();
     Workspace& w = *workspace;
     if (plan_.lit) w.lit = {};  // lanes behind the last gathered sample are computed, too
-    PacketLoop loop(plan_, kernels_, voxels_, empty_ ? &*empty_ : nullptr, w);
+    PacketLoop loop(plan_, kernels_, voxels_, empty_.get(), w);
     const bool colors_alone = !plan_.projection_mode && image.channels.size() == 4;
     for (int y = top; y < bottom; y += kSide)
         for (int x = left; x < right; x += kSide) {

@@ -44,7 +44,7 @@ class LaneRenderer {
     std::int64_t target_;
     StageWays ways_;
     StageKernels kernels_;
-    std::optional<EmptySpace> empty_;
+    std::shared_ptr<const EmptySpace> empty_;
     std::shared_ptr<CellBlocks> cells_;
     bool no_room_to_skip_ = false;
     std::int64_t room_ = 0;  // bytes for what stands beside the volume
