@@ -7,6 +7,7 @@
 
 #include "fixedpoint/words/lanes-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
+#include "pipeline/machines/lanes/packet_rays-inl.h"
 #include "pipeline/stages/ray_setup-inl.h"
 
 #include <algorithm>
@@ -19,10 +20,6 @@ namespace {
 
 using lanes::kRays;
 using lanes::Word;
-
-alignas(64) constexpr double kColumn[kRays] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
-alignas(64) constexpr double kRow[kRays] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
-static_assert(lanes::kSide == 4);
 
 HWY_INLINE void store_words(Reals x, Word* to) {
     const hn::Rebind<Word, Reals::D> narrow;
@@ -39,13 +36,9 @@ HWY_INLINE void store_values(bool as_floats, Reals x, Word* to) {
 void set_up_rays(const Plan& plan, const lanes::PacketPlace& place, lanes::RayPacket& packet) {
     Reals most(0.0), rays(0.0);
     for (int r = 0; r < kRays; r += Reals::count()) {
-        const Reals column = Reals(place.left) + Reals(hn::LoadU(Reals::D(), kColumn + r)),
-                    row = Reals(place.top) + Reals(hn::LoadU(Reals::D(), kRow + r));
-        RaySetupOf<Reals> ray = set_up_ray(plan, column, row);
-        const auto inside = (column < Reals(place.right)) & (row < Reals(place.bottom));
-        ray.slabs = choose(inside, ray.slabs, Reals(0.0));
+        const RaySetupOf<Reals> ray = set_up_packet_rays(plan, place, r);
         most = greater(most, ray.slabs);
-        rays = rays + choose(Reals(0.0) < ray.slabs, Reals(1.0), Reals(0.0));
+        rays = rays + one_where_met(ray);
 
         const RayWords<Reals> words = ray_words<Reals>(plan, ray);
         for (std::size_t a = 0; a < 3; ++a) {
@@ -64,7 +57,7 @@ void set_up_rays(const Plan& plan, const lanes::PacketPlace& place, lanes::RayPa
         hn::StoreU(ray.entry_distance.v, Reals::D(), packet.entry_distance + r);
     }
     packet.most_slabs = static_cast<int>(hn::GetLane(hn::MaxOfLanes(Reals::D(), most.v)));
-    packet.rays = static_cast<int>(hn::GetLane(hn::SumOfLanes(Reals::D(), rays.v)));
+    packet.rays = static_cast<int>(sum_of(rays));
 }
 
 /// 2^bits; never a denormal.

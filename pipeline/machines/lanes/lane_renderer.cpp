@@ -100,6 +100,19 @@ bool may_be_met(const BlockBox& box, const EmptySpace* empty, const Index3& cell
     return false;
 }
 
+// Whether a pixel that has gathered nothing is black and clear to the last bit.
+bool nothing_is_black(const Plan& plan) {
+    const auto black = [&](const auto& nothing) {
+        const std::array<double, 4> color = color_of(
+            plan.compositing, Accumulated<double>{{to_double(nothing.color[0]), to_double(nothing.color[1]),
+                                                   to_double(nothing.color[2])},
+                                                  to_double(nothing.transparency)});
+        return color == std::array<double, 4>{};
+    };
+    return plan.float32 ? black(nothing_yet<Real<float>>(plan.compositing))
+                        : black(nothing_yet<std::int64_t>(plan.compositing));
+}
+
 // Builds the cells that rays may meet, unless the last call for this volume asked for the same ones.
 void build_cells(const std::shared_ptr<CellBlocks>& cells, const Volume& volume, const BlockBox& box,
                  const std::shared_ptr<const EmptySpace>& empty) {
@@ -196,11 +209,15 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
 }
 
 LaneRenderer::LaneRenderer(const Plan& plan, const RenderOptions& options)
-    : plan_(plan), target_(find_target(options.target)), ways_(ways_of(plan)) {
+    : plan_(plan),
+      target_(find_target(options.target)),
+      ways_(ways_of(plan)),
+      count_slabs_(slab_counter(target_)) {
     room_ = options.layout_bytes >= 0 ? options.layout_bytes : free_memory() / 2;
     if (options.skip && plan.skips_empty_space) find_empty();
     choose_layout(options);
     kernels_ = kernels_for(plan, ways_, voxels_, target_);
+    if (empty_ && !plan.projection_mode && nothing_is_black(plan)) seen_ = visible_packets(plan, *empty_);
 }
 
 void LaneRenderer::find_empty() {
@@ -279,6 +296,11 @@ void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& 
     for (int y = top; y < bottom; y += kSide)
         for (int x = left; x < right; x += kSide) {
             const PacketPlace place{x, y, right, bottom};
+            if (colors_alone && !seen_.holds(x, y)) {  // the image is black where nothing is stored
+                const RayCounts counts = count_slabs_(plan_, place);
+                statistics.rays += counts.rays, statistics.samples += counts.slabs;
+                continue;
+            }
             kernels_.set_up(plan_, place, w.rays);
             loop.run();
             if (colors_alone)

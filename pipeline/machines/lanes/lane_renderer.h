@@ -5,6 +5,8 @@
 #include "core/image.h"
 #include "pipeline/machines/lanes/empty_space.h"
 #include "pipeline/machines/lanes/kernels.h"
+#include "pipeline/machines/lanes/ray_counts.h"
+#include "pipeline/machines/lanes/screen_mask.h"
 #include "pipeline/machines/model.h"
 #include "pipeline/render.h"
 
@@ -45,6 +47,8 @@ class LaneRenderer {
     StageWays ways_;
     StageKernels kernels_;
     std::shared_ptr<const EmptySpace> empty_;
+    ScreenMask seen_;
+    CountSlabs count_slabs_;
     std::shared_ptr<CellBlocks> cells_;
     bool no_room_to_skip_ = false;
     std::int64_t room_ = 0;  // bytes for what stands beside the volume

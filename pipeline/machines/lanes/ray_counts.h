@@ -1,0 +1,19 @@
+// Rays and their slabs, counted without being cast.
+#pragma once
+
+#include "pipeline/machines/lanes/packet.h"
+#include "pipeline/plan/plan.h"
+
+#include <cstdint>
+
+namespace squint::lanes {
+
+/// Rays that meet the volume, and their slabs.
+struct RayCounts {
+    std::int64_t rays = 0, slabs = 0;
+};
+using CountSlabs = RayCounts (*)(const Plan&, const PacketPlace&);
+/// Counts what set_up would of a packet, on a SIMD target (kernels.h).
+CountSlabs slab_counter(std::int64_t target);
+
+}  // namespace squint::lanes
