@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include <array>
+#include <optional>
 
 namespace squint::cli {
 namespace {
@@ -35,40 +36,13 @@ std::vector<TableReport> tables_of(const Plan& plan) {
     return tables;
 }
 
-struct FindWires {
-    std::array<bool, kWires>& used;
-    void operator()(const Rescale& rescale) const {
-        if (rescale.wire >= 0) used[static_cast<std::size_t>(rescale.wire)] = true;
-    }
-    void operator()(const auto& table) const {
-        if (table.wire >= 0 && table.rows() > 0) used[static_cast<std::size_t>(table.wire)] = true;
-    }
-};
-
-/// The wires of stages that are modelled, less those that another method would need.
-std::array<bool, kWires> wires_used(const Plan& plan) {
-    std::array<bool, kWires> used{};
-    Plan visited = plan;
-    visit_stages(visited, FindWires{used});
-    // Rounded once in the set-up, by no Rescale.
-    used[static_cast<std::size_t>(Wire::spacing)] = !plan.gradient.isotropic;
-    used[static_cast<std::size_t>(Wire::material)] = true;
-    for (std::size_t w = 0; w < used.size(); ++w)
-        for (const StageReport& stage : plan.stages)
-            if (stage.name == kWireInfo[w].stage && !stage.modelled) used[w] = false;
-    return used;
-}
-
-int word_of(int bits) {
-    for (const int word : {16, 32, 64})
-        if (bits <= word) return word;
-    return 128;
-}
-
-const StageReport& stage_of(const Plan& plan, std::string_view name) {
-    for (const StageReport& stage : plan.stages)
-        if (stage.name == name) return stage;
-    return plan.stages.front();
+/// Bits of the lanes that run a stage; none where the model does.
+std::optional<int> lane_bits(const Plan& plan, std::size_t stage) {
+    if (lanes::what_needs_the_model(plan) || (plan.projection_mode && stage >= 2)) return {};
+    const lanes::StageWays ways = lanes::ways_of(plan);
+    return std::array{ways.location,       ways.interpolation, ways.gradient,
+                      ways.classification, ways.shading,       ways.compositing}[stage]
+        .bits;
 }
 
 std::string in_words(const Plan& plan) {
@@ -85,33 +59,33 @@ PathOf path_of(const Plan& plan) {
 }
 
 std::string stages_text(const Plan& plan) {
-    Rows rows{{"stage", "", "widest operand", "widest result", "word", ""}};
-    for (const StageReport& s : plan.stages) {
-        if (s.modelled && plan.real)
-            rows.push_back({s.name, in_words(plan), "-", "-", "-", s.why});
-        else if (s.modelled)
+    Rows rows{{"stage", "", "widest operand", "widest result", "model's word", "lanes", ""}};
+    for (std::size_t i = 0; i < plan.stages.size(); ++i) {
+        const StageReport& s = plan.stages[i];
+        if (s.modelled && plan.real) {
+            rows.push_back({s.name, in_words(plan), "-", "-", "-", "-", s.why});
+        } else if (s.modelled) {
+            const std::optional<int> bits = lane_bits(plan, i);
             rows.push_back({s.name, "modelled", std::to_string(s.needs.operand_bits),
-                            std::to_string(s.needs.result_bits), std::to_string(word_of(s.needs.result_bits)),
-                            s.why});
-        else
-            rows.push_back({s.name, "left out", "-", "-", "-", s.why});
+                            std::to_string(s.needs.result_bits), std::to_string(plan.word_bits),
+                            bits ? std::to_string(*bits) : "none", s.why});
+        } else {
+            rows.push_back({s.name, "left out", "-", "-", "-", "-", s.why});
+        }
     }
     return table_text(rows, "  ");
 }
 
 std::string wires_text(const Plan& plan) {
-    Rows rows{{"wire", "format", "rounding", "overflow", "width", "word", "meaning"}};
+    Rows rows{{"wire", "format", "rounding", "overflow", "width", "meaning"}};
     std::string_view stage;
-    const auto used = wires_used(plan);
-    for (int w = 0; w < kWires; ++w) {
-        const WireInfo& wire = kWireInfo[static_cast<std::size_t>(w)];
-        const StageReport& report = stage_of(plan, wire.stage);
-        if (!used[static_cast<std::size_t>(w)]) continue;
+    for (const Wire w : plan.used_wires) {
+        const WireInfo& wire = info(w);
         if (wire.stage != stage) stage = wire.stage, rows.push_back({fmt::format("[{}]", stage)});
-        const Spec& spec = plan.specs.spec[static_cast<std::size_t>(w)];
+        const Spec& spec = plan.specs[w];
         rows.push_back({std::string(wire.name), to_string(spec.format), to_string(spec.rounding),
                         to_string(spec.overflow), std::to_string(spec.format.width()),
-                        std::to_string(word_of(report.needs.result_bits)), std::string(wire.meaning)});
+                        std::string(wire.meaning)});
     }
     return table_text(rows, "  ");
 }
@@ -127,13 +101,12 @@ std::string tables_text(const Plan& plan) {
 /// A line a stage: what it is made of.
 std::string brief_text(const Plan& plan) {
     std::string text;
-    const auto used = wires_used(plan);
     for (const StageReport& stage : plan.stages) {
         std::string wires;
-        for (std::size_t w = 0; w < kWireInfo.size(); ++w)
-            if (kWireInfo[w].stage == stage.name && used[w])
-                wires += fmt::format("{}{} {}", wires.empty() ? "" : ", ", kWireInfo[w].name,
-                                     to_string(plan.specs.spec[w].format));
+        for (const Wire w : plan.used_wires)
+            if (info(w).stage == stage.name)
+                wires += fmt::format("{}{} {}", wires.empty() ? "" : ", ", info(w).name,
+                                     to_string(plan.specs[w].format));
         text += fmt::format("  {:<16} {}\n", stage.name,
                             !stage.modelled ? "left out: " + stage.why
                             : plan.real     ? in_words(plan)
@@ -143,13 +116,19 @@ std::string brief_text(const Plan& plan) {
 }
 
 Json json_of_plan(const Plan& plan) {
-    Json stages = Json::array(), tables = Json::array();
-    for (const StageReport& s : plan.stages) {
+    Json stages = Json::array(), tables = Json::array(), wires = Json::object();
+    const Json all_wires = json_of_wires(plan);
+    for (const Wire wire : plan.used_wires)
+        wires[std::string(info(wire).name)] = all_wires[std::string(info(wire).name)];
+    for (std::size_t i = 0; i < plan.stages.size(); ++i) {
+        const StageReport& s = plan.stages[i];
         stages.push_back({{"name", s.name}, {"modelled", s.modelled}, {"why", s.why}});
-        if (s.modelled && !plan.real)
-            stages.back().update({{"operand_bits", s.needs.operand_bits},
-                                  {"result_bits", s.needs.result_bits},
-                                  {"word_bits", word_of(s.needs.result_bits)}});
+        if (!s.modelled || plan.real) continue;
+        const std::optional<int> bits = lane_bits(plan, i);
+        stages.back().update({{"operand_bits", s.needs.operand_bits},
+                              {"result_bits", s.needs.result_bits},
+                              {"model_word_bits", plan.word_bits},
+                              {"lane_bits", bits ? Json(*bits) : Json(nullptr)}});
     }
     for (const TableReport& t : tables_of(plan))
         tables.push_back({{"name", t.name},
@@ -167,7 +146,7 @@ Json json_of_plan(const Plan& plan) {
             {"model_word_bits", plan.real ? Json(nullptr) : Json(plan.word_bits)},
             {"skips_empty_space", plan.skips_empty_space},
             {"stages", stages},
-            {"wires", json_of_wires(plan)},
+            {"wires", wires},
             {"tables", tables},
             {"memory", json_of(memory_of(plan, {}))},
             {"notes", plan.notes},

@@ -18,8 +18,9 @@ namespace squint {
 /// built.
 class CellTable {
   public:
-    int wire = -1;       // whose it is, for attribution
-    bool active = true;  // Real reads the quantised words, or (false) the exact values
+    int wire = -1;        // whose it is, for attribution
+    int alpha_wire = -1;  // of the last channel
+    bool active = true;   // Real reads the quantised words, or (false) the exact values
 
     CellTable() = default;
     /// Words are at most `largest`: 16 bits each where they fit, else 32.
@@ -31,6 +32,7 @@ class CellTable {
             data_->wide.resize(values() + kPadding);
     }
     int size() const { return size_; }
+    int wire_of(int channel) const { return channel == 3 ? alpha_wire : wire; }
     int columns() const { return 4; }
     std::int64_t rows() const { return std::int64_t{size_} * size_; }
     std::size_t values() const { return static_cast<std::size_t>(rows()) * 4; }
@@ -117,6 +119,7 @@ std::array<Real<T>, 4> gather_cell(const CellTable& t, Real<T> row, Real<T> colu
 }
 /// Any word the format holds; the index, too, must fit.
 inline std::array<Range, 4> gather_cell(const CellTable& t, Range, Range) {
+    note_wire(WordTag<Range>{}, t.wire), note_wire(WordTag<Range>{}, t.alpha_wire);
     noted({0, t.rows() * 4});
     const Range any = noted({0, t.largest()});
     return {any, any, any, any};

@@ -5,6 +5,7 @@ namespace squint {
 
 thread_local WordNeeds Range::needs;
 thread_local std::uint64_t Range::limited = 0;
+thread_local std::uint64_t Range::used = 0;
 
 namespace {
 
@@ -79,6 +80,7 @@ Range select(Perhaps, Range yes, Range no) {
     return {std::min(yes.low, no.low), std::max(yes.high, no.high)};
 }
 Range gather(const Table& table, Range, int column) {
+    note_wire(WordTag<Range>{}, table.wire_of(column));
     Range all{table.word(0, column), table.word(0, column)};
     for (int row = 1; row < table.rows(); ++row)
         all = {std::min<Int128>(all.low, table.word(row, column)),
@@ -122,6 +124,7 @@ Range vector_length(const std::array<Range, 3>& v, int guard) {
     return noted({0, static_cast<Int128>(std::sqrt(static_cast<double>(squares))) + 1});
 }
 Range quantise(Range x, const Rescale& to) {
+    note_wire(WordTag<Range>{}, to.wire);
     Range rounded = x;
     if (to.shift <= 0) {
         rounded = shift_left(x, -to.shift);
@@ -135,6 +138,7 @@ Range quantise(Range x, const Rescale& to) {
     return {limit(rounded.low, to), limit(rounded.high, to)};
 }
 Range quotient(Range numerator, Range denominator, const Rescale& to) {
+    note_wire(WordTag<Range>{}, to.wire);
     const Int128 factor = Int128{1} << -to.shift;
     const Int128 scaled_high = product(std::max<Int128>(numerator.high, 0), factor);
     const Int128 scaled_low = product(std::max<Int128>(numerator.low, 0), factor);

@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -16,13 +17,15 @@ namespace squint {
 /// where one does not fit.  Copies share what was built.
 class Table {
   public:
-    int wire = -1;       // whose it is, for attribution
-    bool active = true;  // Real reads the quantised words, or (false) the exact values
+    int wire = -1;                 // whose it is, for attribution
+    std::optional<int> last_wire;  // of the last column, where it differs; -1: nobody's
+    bool active = true;            // Real reads the quantised words, or (false) the exact values
 
     Table() = default;
     /// Zeros.  The exact values take twice the words' room: without `keeps_exact` there are none.
     Table(int rows, int columns, bool keeps_exact = true);
 
+    int wire_of(int column) const { return last_wire && column == columns_ - 1 ? *last_wire : wire; }
     int columns() const { return columns_; }
     int rows() const { return data_ ? static_cast<int>(data_->size) / columns_ : 0; }
     std::size_t index(std::int64_t row, int column) const {

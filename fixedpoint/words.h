@@ -34,6 +34,10 @@ constexpr W constant(std::int64_t value) {
     return make_word(WordTag<W>{}, value);
 }
 
+/// Says that a constant stands on a wire, by its index, or a table's word (-1: none): for words that list wires.
+template <class W>
+constexpr void note_wire(WordTag<W>, int) {}
+
 // ---------------------------------------------------------------------------------------- integers
 
 template <Integer W>
@@ -368,7 +372,11 @@ struct Range {
     Int128 low = 0, high = 0;
     static thread_local WordNeeds needs;
     static thread_local std::uint64_t limited;  // bit w: wire w can saturate or wrap
+    static thread_local std::uint64_t used;     // bit w: something passes wire w, or is read from its table
 };
+inline void note_wire(WordTag<Range>, int wire) {
+    if (wire >= 0) Range::used |= std::uint64_t{1} << wire;
+}
 /// A comparison of ranges: both answers are looked at.
 struct Perhaps {
     friend constexpr Perhaps operator&(Perhaps, Perhaps) { return {}; }

@@ -31,7 +31,8 @@ template <class W>
 HWY_INLINE W opacity_of_depth(const OpacityUnit& unit, W depth) {
     const int fraction = unit.depth_fraction - unit.row_bits;
     const W row = min(floor_shift(depth, fraction), constant<W>(unit.rows.rows() - 2));
-    const W rest = min(depth - shift_left(row, fraction), constant<W>(std::int64_t{1} << fraction));
+    const std::int64_t one = std::int64_t{1} << fraction;
+    const W rest = within(min(depth - shift_left(row, fraction), constant<W>(one)), 0, one);
     return quantise(
         blend(gather(unit.rows, row, 0), gather(unit.rows, row + constant<W>(1), 0), rest, fraction),
         unit.to_alpha);
@@ -70,8 +71,8 @@ struct EntryPosition {
 template <class W>
 HWY_INLINE EntryPosition<W> entry_position(const EntrySpacing& e, W input) {
     const W entry = min(floor_shift(input, e.input_fraction), constant<W>(e.last_segment));
-    return {entry, min(input - shift_left(entry, e.input_fraction),
-                       constant<W>(std::int64_t{1} << e.input_fraction))};
+    const std::int64_t one = std::int64_t{1} << e.input_fraction;
+    return {entry, within(min(input - shift_left(entry, e.input_fraction), constant<W>(one)), 0, one)};
 }
 
 /// One where a position is opaque: on an opaque entry, or between two (docs/conventions.md).

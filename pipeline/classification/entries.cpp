@@ -112,7 +112,9 @@ EntryLookup build_entry_lookup(const ClassificationInputs& in) {
     EntryLookup lookup;
     lookup.table = Table(n, 4, in.keeps_exact), lookup.matter = Table(n, 2, in.keeps_exact);
     lookup.table.wire = static_cast<int>(Wire::table_color);
+    lookup.table.last_wire = static_cast<int>(Wire::table_alpha);
     lookup.matter.wire = static_cast<int>(Wire::table_extinction);
+    lookup.matter.last_wire = -1;  // flags
     lookup.input_fraction = in.input_fraction;
     lookup.last_segment = n - 2;
     // The square of an F-bit root has 2 F bits; a plain alpha has its own F.

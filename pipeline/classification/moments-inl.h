@@ -159,7 +159,8 @@ HWY_NOINLINE std::array<W, 3> series_color(const MomentSeries& m, W near, W far,
     // Weights between two rows.
     const int fraction = m.depth_fraction - m.row_bits;
     const W row = min(floor_shift(depth, fraction), constant<W>(m.weights.rows() - 2));
-    const W rest = min(depth - shift_left(row, fraction), constant<W>(std::int64_t{1} << fraction));
+    const std::int64_t one = std::int64_t{1} << fraction;
+    const W rest = within(min(depth - shift_left(row, fraction), constant<W>(one)), 0, one);
     Powers<W> weight;
     for (int j = 1; j < m.order; ++j)
         weight[static_cast<std::size_t>(j)] =

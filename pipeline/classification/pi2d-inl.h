@@ -26,7 +26,8 @@ HWY_INLINE EntryPosition<W> node_position(const PreIntegrated2D& m, W input) {
         return {min(floor_shift(node + half, bits), constant<W>(m.cells.size() - 1)), constant<W>(0)};
     }
     const W cell = min(floor_shift(node, bits), constant<W>(m.cells.size() - 2));
-    return {cell, min(node - shift_left(cell, bits), constant<W>(std::int64_t{1} << bits))};
+    const std::int64_t one = std::int64_t{1} << bits;
+    return {cell, within(min(node - shift_left(cell, bits), constant<W>(one)), 0, one)};
 }
 
 /// The table between its cells: three lerps, each rounded once.

@@ -92,6 +92,7 @@ PreIntegrated2D build_pre_integrated_2d(const ClassificationInputs& in) {
     const Entries entries = without_walls(in.entries, m.prefix.predicts);
     m.cells = CellTable(size, encode.largest());
     m.cells.wire = static_cast<int>(Wire::slab_color);
+    m.cells.alpha_wire = static_cast<int>(Wire::slab_alpha);
     const double length = in.step_world;
     const bool attenuated = m.self_attenuation;
     if (m.cells.is_narrow())

@@ -39,7 +39,8 @@ HWY_INLINE EntryPosition<W> sub_entry_position(const EntryLookup& e, int sub_ent
     const int bits = e.input_fraction - sub_entry_bits;
     const std::int64_t last = (static_cast<std::int64_t>(e.last_segment + 1) << sub_entry_bits) - 1;
     const W entry = min(floor_shift(input, bits), constant<W>(last));
-    return {entry, min(input - shift_left(entry, bits), constant<W>(std::int64_t{1} << bits))};
+    const std::int64_t one = std::int64_t{1} << bits;
+    return {entry, within(min(input - shift_left(entry, bits), constant<W>(one)), 0, one)};
 }
 
 /// T, exact with gained_bits() more fraction bits than its words.  With tau linear over a row's reach,

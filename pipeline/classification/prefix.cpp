@@ -99,7 +99,6 @@ PrefixLookup build_prefix_lookup(const ClassificationInputs& in, int sub_entry_b
             p.walls.set_raw(i, 0, prediction.up[static_cast<std::size_t>(i)]);
             p.walls.set_raw(i, 1, prediction.down[static_cast<std::size_t>(i)]);
         }
-        p.walls.wire = static_cast<int>(Wire::table_extinction);
     }
     return p;
 }

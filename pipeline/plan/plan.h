@@ -67,6 +67,8 @@ struct Plan {
         normal_needs;       // of stage 3's two halves: up to the raw gradient, and normalising it
     WordNeeds input_needs;  // of a sample on its way to table entries, between stages 2 and 4
     int word_bits = 64;     // of the golden model: 64 or 128
+    std::vector<Wire>
+        used_wires;  // that carry anything, in order: found by running the stages over intervals
     std::vector<StageReport> stages;
     std::vector<TableReport> tables;
     std::vector<std::string> notes;     // what a user should know

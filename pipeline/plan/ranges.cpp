@@ -1,7 +1,7 @@
 #include "pipeline/plan/ranges.h"
 
 #include "core/error.h"
-#include "pipeline/slab-inl.h"
+#include "pipeline/plan/any_slab-inl.h"
 
 #include <fmt/format.h>
 
@@ -33,28 +33,6 @@ class Ledger : public Silent {
   private:
     std::optional<Part> part_;
 };
-
-// Anything that a volume holds, wherever it is.
-struct AnyVoxel {
-    Range voxel;
-    Cell<Range> cell(const std::array<Range, 3>&) const {
-        Cell<Range> cell;
-        cell.corner.fill(voxel);
-        return cell;
-    }
-    Neighbourhood<Range> neighbourhood(const std::array<Range, 3>&) const {
-        Neighbourhood<Range> near;
-        near.voxel.fill(voxel);
-        return near;
-    }
-};
-
-Range up_to(std::int64_t high) {
-    return {0, high};
-}
-Range format_range(const Format& f) {
-    return {f.smallest(), f.largest()};
-}
 
 // Wires that no value of this scene can saturate or wrap need no limits.
 struct LeaveOutLimits {
@@ -91,37 +69,9 @@ void leave_out_proven_limits(Plan& plan, const Slab<Range>& slab) {
 }  // namespace
 
 void choose_words(Plan& plan) {
-    const auto most_slabs = static_cast<std::int64_t>(most_steps(plan)) + 2;
-    Range::limited = 0;
-
-    RayWords<Range> ray{};
-    for (std::size_t a = 0; a < 3; ++a) {
-        ray.first[a] = ray.last[a] = up_to(plan.location.limit[a]);
-        ray.step[a] = format_range(plan.location.direction.format);
-        ray.view[a] = format_range(plan.shading.light_spec.format);
-        for (auto& half : ray.half) half[a] = format_range(plan.shading.light_spec.format);
-    }
-    ray.last_index = up_to(most_slabs), ray.last_length = up_to(plan.specs[Wire::length].format.one());
-
-    // Any slab of any ray, onto whatever the slabs before it have left.
+    Range::limited = Range::used = 0;
     Ledger ledger;
-    const AnyVoxel voxels{{plan.volume->smallest, plan.volume->largest}};
-    std::visit(
-        [&](const auto& method) {
-            Slabs slabs(plan, method, voxels, ray, up_to(most_slabs), ledger);
-            slabs.pixel.transparency = up_to(plan.compositing.unit());
-            for (Range& c : slabs.pixel.color) c = format_range(plan.specs[Wire::color].format);
-            if (!plan.projection_mode) {
-                slabs.step(up_to(most_slabs - 1));
-                return;
-            }
-            Range scalar = slabs.sample(up_to(most_slabs)).input;
-            ledger.at(Part::classification);
-            if (plan.scene.compositing.mode == CompositingMode::average)
-                scalar = noted({0, scalar.high * most_slabs});  // a sum of so many
-            slabs.project(scalar, up_to(most_slabs));
-        },
-        plan.method);
+    any_slab<Range>(plan, ledger);
     ledger.close();
     const auto needs_of = [&](Part part) { return ledger.needs[static_cast<std::size_t>(part)]; };
     plan.input_needs = needs_of(Part::input);
@@ -142,6 +92,10 @@ void choose_words(Plan& plan) {
                             kStages[i], needs[i].result_bits, plan.stages[i].why));
     }
     plan.word_bits = all.result_bits <= 63 ? 64 : 128;
+    static_assert(kWires <= 64);
+    plan.used_wires.clear();
+    for (int w = 0; w < kWires; ++w)
+        if (Range::used >> w & 1) plan.used_wires.push_back(static_cast<Wire>(w));
     visit_stages(plan, LeaveOutLimits{Range::limited});
     leave_out_proven_limits(plan, ledger.last);
 }

@@ -5,8 +5,8 @@
 
 namespace squint {
 
-/// Sets the needs of every stage, the golden model's word, and which wires need no limits because no value of
-/// the scene can pass them.  Everything else of the plan must be there.  Throws InputError, naming the stage,
+/// Sets the needs of every stage, the golden model's word, the wires in use, and which of them need no limits
+/// because no value of the scene can pass them.  Everything else of the plan must be there.  Throws InputError, naming the stage,
 /// where no word holds its results.
 void choose_words(Plan& plan);
 

@@ -89,6 +89,7 @@ HWY_INLINE void composite(const CompositingStage& s, Accumulated<W>& pixel, std:
                 quantise(pixel.color[c] + unit_product(s, quantise(color[c] * unit, s.color_to_code), t),
                          s.to_color_sum);
         t = unit_product(s, t, max(unit - code, constant<W>(0)));
+        note_wire(WordTag<W>{}, static_cast<int>(Wire::transparency));
         return;
     }
     const W clear = constant<W>(std::int64_t{1} << s.alpha_fraction) - alpha;

@@ -95,9 +95,9 @@ template <class W>
 HWY_INLINE W to_world(const GradientStage& s, W component, int axis) {
     if (s.isotropic) return component;
     const auto a = static_cast<std::size_t>(axis);
-    return quantise(
-        component * stage_constant<W>(s.spacing[a], s.spacing_exact[a], s.spacing_fraction, s.active),
-        s.to_scaled);
+    return quantise(component * stage_constant<W>(s.spacing[a], s.spacing_exact[a], s.spacing_fraction,
+                                                  s.active, Wire::spacing),
+                    s.to_scaled);
 }
 
 /// -g / |g| in s1.F, in integers.  Steps: scale so that the largest component has kNormalBits bits (floor of

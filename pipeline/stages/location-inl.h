@@ -9,22 +9,28 @@
 #include "pipeline/stages/location.h"
 
 #include "fixedpoint/unrolled-inl.h"
+#include "scene/wires.h"
 
 #include <hwy/highway.h>
+
+#include <optional>
 
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
-/// A constant in words: the rounded one, or (Real, inactive) the exact one in raw units.
+/// A constant in words: the rounded one, or (Real, inactive) the exact one in raw units.  `wire`: the one whose
+/// format it stands in.
 template <class W>
-HWY_INLINE W stage_constant(std::int64_t raw, double, int, bool) {
+HWY_INLINE W stage_constant(std::int64_t raw, double, int, bool, std::optional<Wire> wire = {}) {
+    if (wire) note_wire(WordTag<W>{}, static_cast<int>(*wire));
     return constant<W>(raw);
 }
 template <class W>
 requires requires(W w) {
     typename W::IsReal;
 }
-HWY_INLINE W stage_constant(std::int64_t raw, double exact, int fraction, bool active) {
+HWY_INLINE W stage_constant(std::int64_t raw, double exact, int fraction, bool active,
+                            std::optional<Wire> = {}) {
     return W::from(active ? static_cast<double>(raw) : exact * power_of_two<double>(fraction));
 }
 

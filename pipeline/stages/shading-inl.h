@@ -36,7 +36,7 @@ HWY_INLINE W power(const ShadingStage& s, W x) {
         return max(one - quantise((one - x) * constant<W>(s.parabola_slope), s.to_fall), zero);
     const int fraction = s.power_fraction - s.power_table_bits;  // a table, linear between its rows
     const W row = min(floor_shift(x, fraction), constant<W>((std::int64_t{1} << s.power_table_bits) - 1));
-    const W rest = x - shift_left(row, fraction);
+    const W rest = within(x - shift_left(row, fraction), 0, std::int64_t{1} << fraction);
     return quantise(
         blend(gather(s.power_table, row, 0), gather(s.power_table, row + constant<W>(1), 0), rest, fraction),
         s.to_power_lerp);
@@ -52,10 +52,11 @@ HWY_INLINE void shade(const ShadingStage& s, const RayWords<W>& ray, const std::
     for (std::size_t l = 0; l < static_cast<std::size_t>(s.lights); ++l) {
         std::array<W, 3> light, half;
         for (std::size_t a = 0; a < 3; ++a) {
-            light[a] = stage_constant<W>(s.light[l][a], s.light_exact[l][a], s.light_fraction, s.active);
-            half[a] = s.half_per_ray
-                          ? ray.half[l][a]
-                          : stage_constant<W>(s.half[l][a], s.half_exact[l][a], s.light_fraction, s.active);
+            light[a] = stage_constant<W>(s.light[l][a], s.light_exact[l][a], s.light_fraction, s.active,
+                                         Wire::light);
+            half[a] = s.half_per_ray ? ray.half[l][a]
+                                     : stage_constant<W>(s.half[l][a], s.half_exact[l][a], s.light_fraction,
+                                                         s.active, Wire::light);
         }
         W facing = dot(normal, light, s.to_dot);
         W highlight;
@@ -76,16 +77,16 @@ HWY_INLINE void shade(const ShadingStage& s, const RayWords<W>& ray, const std::
         facing = clamp(facing, zero, one_dot);
         highlight = power(s, clamp(highlight, zero, one_dot));
         for (std::size_t c = 0; c < channels; ++c) {
-            const W tint =
-                stage_constant<W>(s.color[l][c], s.color_exact[l][c], s.material_fraction, s.active);
+            const W tint = stage_constant<W>(s.color[l][c], s.color_exact[l][c], s.material_fraction,
+                                             s.active, Wire::material);
             diffuse[c] = diffuse[c] + facing * tint;
             specular[c] = specular[c] + highlight * tint;
         }
     }
     const W one = constant<W>(std::int64_t{1} << s.intensity_fraction);
-    const W ka = stage_constant<W>(s.ka, s.material[0], s.material_fraction, s.active);
-    const W kd = stage_constant<W>(s.kd, s.material[1], s.material_fraction, s.active);
-    const W ks = stage_constant<W>(s.ks, s.material[2], s.material_fraction, s.active);
+    const W ka = stage_constant<W>(s.ka, s.material[0], s.material_fraction, s.active, Wire::material);
+    const W kd = stage_constant<W>(s.kd, s.material[1], s.material_fraction, s.active, Wire::material);
+    const W ks = stage_constant<W>(s.ks, s.material[2], s.material_fraction, s.active, Wire::material);
     for (std::size_t c = 0; c < channels; ++c) {
         const W sum = clamp(quantise(diffuse[c], s.to_diffuse_sum), zero, one);
         diffuse[c] =

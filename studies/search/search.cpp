@@ -131,7 +131,7 @@ class Searcher {
                                 "precision.preset=default",
                                 name_of_scene(i), plan.scene.precision.preset, name_of_scene(0),
                                 plans[0].scene.precision.preset));
-            for (const Wire wire : used_wires(plan)) used.insert(wire), users_[wire].push_back(i);
+            for (const Wire wire : plan.used_wires) used.insert(wire), users_[wire].push_back(i);
         }
         preset_ = plans[0].scene.precision.preset;
         for (const Wire wire : s_.wires.empty() ? std::vector<Wire>(used.begin(), used.end()) : s_.wires) {

@@ -205,7 +205,7 @@ Evaluator::Evaluator(const SweepFile& sweep, std::string folder, const std::atom
 std::vector<Wire> Evaluator::wires_in_use() {
     std::vector<Wire> all;
     for (const Scene& base : bases_) {
-        const std::vector<Wire> used = used_wires(make_plan(base, volume_of(base)));
+        const std::vector<Wire> used = make_plan(base, volume_of(base)).used_wires;
         all.insert(all.end(), used.begin(), used.end());
     }
     std::sort(all.begin(), all.end());
@@ -268,7 +268,7 @@ WireSpecs Evaluator::specs_of(const Scene& scene, const std::shared_ptr<const Vo
 std::string Evaluator::identity(const Scene& scene, const std::shared_ptr<const Volume>& volume,
                                 const WireSpecs& specs) {
     Hasher hasher;
-    hasher.text("squint.point/1");
+    hasher.text("squint.point/2");
     add_settings(hasher, scene, *volume, {"compositing.form"});
     const CompositingForm form = scene.compositing.form;
     hasher.text(std::string(
@@ -306,7 +306,7 @@ Prepared Evaluator::prepare(const Point& point) {
     } catch (const InputError& error) {
         p.failure = error.what();
         Hasher hasher;
-        hasher.text("squint.point/1 failed"), hasher.text(p.scene_file);
+        hasher.text("squint.point/2 failed"), hasher.text(p.scene_file);
         for (const std::string& text : p.settings) hasher.text(text);
         for (const WireEdit& e : point.edits)
             hasher.text(fmt::format("{} {} {} {}", static_cast<int>(e.wire), static_cast<int>(e.part),
@@ -484,7 +484,7 @@ Json Evaluator::measure(const Prepared& point, int threads, bool timed) {
     }
     json["cost"] = json_of(cost_of(plan));
     Json& wires = json["wires"] = Json::object();
-    for (const Wire wire : used_wires(plan))
+    for (const Wire wire : plan.used_wires)
         wires[std::string(info(wire).name)] = plan.real ? plan.real_name() : to_string(plan.specs[wire]);
     json["volume"] = {{"name", std::filesystem::path(point.volume->name).filename().string()},
                       {"hash", point.volume->content_hash}};

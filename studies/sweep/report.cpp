@@ -10,6 +10,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -58,6 +59,23 @@ Json error_of(const Json& figures) {
     return json;
 }
 
+// Figures of a point's cost, as its record names them.
+constexpr std::array kCostNames{"bits",
+                                "word_bits",
+                                "multiplier_bits",
+                                "divider_bits",
+                                "rounding_bits",
+                                "constant_multiplier_bits",
+                                "lookups",
+                                "lookup_bits",
+                                "table_bits",
+                                "table_bytes",
+                                "pixel_bits",
+                                "buffer_bytes",
+                                "voxel_bytes_per_sample",
+                                "voxel_bytes_per_lit_sample",
+                                "entry_bytes_per_sample"};
+
 Json point_of(const Json& record) {
     Json p{{"hash", record["hash"]}, {"status", record["status"]}, {"command", command_of(record)}};
     if (record["status"] != "done") return p["reason"] = record.value("reason", ""), p;
@@ -70,10 +88,8 @@ Json point_of(const Json& record) {
     p["width"] = record["width"], p["height"] = record["height"];
     p["volume"] = record["volume"]["name"];
     const Json& cost = record["cost"];
-    for (const char* name :
-         {"bits", "word_bits", "multiplier_bits", "table_bits", "table_bytes", "pixel_bits", "buffer_bytes",
-          "voxel_bytes_per_sample", "voxel_bytes_per_lit_sample", "entry_bytes_per_sample"})
-        p["cost"][name] = cost[name];
+    for (const char* name : kCostNames)
+        if (cost.contains(name)) p["cost"][name] = cost[name];  // points of /1 have fewer
     for (const auto& [stage, figures] : cost["stages"].items())
         p["stages"][stage] = {figures["word_bits"], figures["multiplier_bits"]};
     p["wires"] = record["wires"];
@@ -279,9 +295,7 @@ std::vector<Column> columns_of(const Json& data) {
     add("ms", [&](const Json&, const Json& point) { return at(point, {"ms"}); });
     for (const char* name : {"path", "samples"})
         add(name, [&](const Json&, const Json& point) { return at(point, {name}); });
-    for (const char* name :
-         {"bits", "word_bits", "multiplier_bits", "table_bits", "table_bytes", "pixel_bits", "buffer_bytes",
-          "voxel_bytes_per_sample", "voxel_bytes_per_lit_sample", "entry_bytes_per_sample"})
+    for (const char* name : kCostNames)
         add(name, [&](const Json&, const Json& point) { return at(point, {"cost", name}); });
     add("C - A above 0", [&](const Json&, const Json& point) { return at(point, {"color_above_alpha"}); });
     add("C + T - 1 least", [&](const Json&, const Json& point) {

@@ -235,15 +235,17 @@ TEST(SweepCost, IsTheSumOfWidthsAndOfProductsOfOperandWidths) {
     EXPECT_EQ(cost.stages[0].word_bits, 23 + 14 + 13 + 16);
     // Three lerp levels of u12.12; voxels of 8 bits and a sign, then 24 bits and a sign, by a weight of 13.
     EXPECT_EQ(cost.stages[1].word_bits, 3 * 24);
-    EXPECT_EQ(cost.stages[1].multiplier_bits, (4 * 9 + 2 * 25 + 25) * 13);
+    EXPECT_EQ(cost.stages[1].bill.multiplier_bits(), (4 * 9 + 2 * 25 + 25) * 13);
+    EXPECT_EQ(operation_bits(cost.stages[1].bill), cost.stages[1].bill.multiplier_bits()) << "truncated";
     // Equation 9, C and T: alpha c, then T times that, then T (1 - alpha), in words of 16 bits.
     EXPECT_EQ(cost.stages[3].word_bits, 2 * 16);
-    EXPECT_EQ(cost.stages[3].multiplier_bits, 7 * 16 * 16);
+    EXPECT_EQ(cost.stages[3].bill.multiplier_bits(), 7 * 16 * 16);
     EXPECT_EQ(cost.pixel_bits, 4 * 16);
     EXPECT_EQ(cost.voxel_bytes, 8);
-    std::int64_t words = 0, multipliers = 0;
-    for (const StageCost& stage : cost.stages) words += stage.word_bits, multipliers += stage.multiplier_bits;
-    EXPECT_EQ(cost.bits(), words + multipliers);
+    std::int64_t words = 0, operations = 0;
+    for (const StageCost& stage : cost.stages)
+        words += stage.word_bits, operations += operation_bits(stage.bill);
+    EXPECT_EQ(cost.bits(), words + operations);
 }
 
 TEST(SweepCost, CountsEveryWireThatCarriesSomething) {
@@ -257,7 +259,7 @@ TEST(SweepCost, CountsEveryWireThatCarriesSomething) {
             settings + " }]\n");
         Evaluator evaluator(sweep, "");
         const Prepared p = evaluator.prepare(expand(sweep, {})[0]);
-        const auto used = used_wires(make_plan(p.scene, p.volume));
+        const auto used = make_plan(p.scene, p.volume).used_wires;
         const Json record = evaluator.measure(p, 1, false);
         for (const auto& [name, counts] : record["audit"].items()) {
             Wire wire{};

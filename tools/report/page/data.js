@@ -6,7 +6,7 @@ const state = { against: '', channel: 'color', figure: 'rmse', cost: 'bits', fil
 
 const kFigures = { rmse: 'RMSE in LSB8', max: 'greatest error in LSB8', bias: 'bias in LSB8', psnr: 'PSNR in dB', ssim: 'SSIM' };
 const kChannels = { color: 'colour, linear light', alpha: 'opacity', color_srgb: 'colour on an sRGB display' };
-const kCosts = { bits: 'bits (words + multipliers)', word_bits: 'bits of words', multiplier_bits: 'bits of multipliers', table_bits: 'bits of tables', table_bytes: 'bytes of tables', pixel_bits: 'bits of a pixel', ms: 'ms a frame' };
+const kCosts = { bits: 'bits (words + operations)', word_bits: 'bits of words', multiplier_bits: 'bits of multipliers', divider_bits: 'bits of dividers', rounding_bits: 'bits of roundings', lookup_bits: 'bits looked up', table_bits: 'bits of tables', table_bytes: 'bytes of tables', pixel_bits: 'bits of a pixel', ms: 'ms a frame' };
 const kHalf = 0.5; // LSB8: what rounding to 8 bits may cost anyway
 const kStages = ['sample location', 'interpolation', 'gradient', 'classification', 'shading', 'compositing'];
 const kStageOf = {

@@ -1,0 +1,359 @@
+// The tally against a count of its own: a word that knows no widths and counts what the stages do with it.
+#include "studies/sweep/cost.h"
+
+#include "core/volume_source.h"
+#include "pipeline/plan/any_slab-inl.h"
+#include "pipeline/render.h"
+#include "scene/scene.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+namespace squint {
+namespace {
+
+struct Counts {
+    std::int64_t products = 0, constant_products = 0, quotients = 0, roundings = 0, lookups = 0;
+    bool operator==(const Counts&) const = default;
+};
+std::ostream& operator<<(std::ostream& out, const Counts& c) {
+    return out << c.products << " products, " << c.constant_products << " by constants, " << c.quotients
+               << " quotients, " << c.roundings << " roundings, " << c.lookups << " look-ups";
+}
+Counts counted;
+
+/// An integer, constant or not.  `BothWays`: comparisons have no answer, and what varies has no value.
+template <bool BothWays>
+struct Counting {
+    Int128 v = 0;
+    bool is_constant = false;
+};
+template <bool B>
+Counting<B> varying(Int128 v) {
+    return {B ? 0 : v, false};
+}
+template <bool B>
+Counting<B> result_of(Int128 v, bool is_constant) {
+    return is_constant ? Counting<B>{v, true} : varying<B>(v);
+}
+template <bool B>
+bool is_shift(const Counting<B>& x) {
+    const Int128 size = squint::absolute(x.v);
+    return x.is_constant && (size & (size - 1)) == 0;
+}
+template <bool B>
+void count_product(const Counting<B>& a, const Counting<B>& b) {
+    if (is_shift(a) || is_shift(b) || (a.is_constant && b.is_constant)) return;
+    ++(a.is_constant || b.is_constant ? counted.constant_products : counted.products);
+}
+template <bool B>
+Counting<B> make_word(WordTag<Counting<B>>, std::int64_t value) {
+    return {value, true};
+}
+template <bool B>
+Counting<B> operator+(Counting<B> a, Counting<B> b) {
+    return result_of<B>(a.v + b.v, a.is_constant && b.is_constant);
+}
+template <bool B>
+Counting<B> operator-(Counting<B> a, Counting<B> b) {
+    return result_of<B>(a.v - b.v, a.is_constant && b.is_constant);
+}
+template <bool B>
+Counting<B> operator*(Counting<B> a, Counting<B> b) {
+    count_product(a, b);
+    return result_of<B>(a.v * b.v, a.is_constant && b.is_constant);
+}
+template <bool B>
+auto answer(bool yes) {
+    if constexpr (B)
+        return Perhaps{};
+    else
+        return yes;
+}
+template <bool B>
+auto operator==(Counting<B> a, Counting<B> b) {
+    return answer<B>(a.v == b.v);
+}
+template <bool B>
+auto operator<(Counting<B> a, Counting<B> b) {
+    return answer<B>(a.v < b.v);
+}
+template <bool B>
+Counting<B> shift_left(Counting<B> x, int bits) {
+    return result_of<B>(squint::shift_left(x.v, bits), x.is_constant);
+}
+template <bool B>
+Counting<B> floor_shift(Counting<B> x, int bits) {
+    return result_of<B>(x.v >> bits, x.is_constant);
+}
+template <bool B>
+Counting<B> min(Counting<B> a, Counting<B> b) {
+    return result_of<B>(std::min(a.v, b.v), a.is_constant && b.is_constant);
+}
+template <bool B>
+Counting<B> max(Counting<B> a, Counting<B> b) {
+    return result_of<B>(std::max(a.v, b.v), a.is_constant && b.is_constant);
+}
+template <bool B>
+Counting<B> absolute(Counting<B> x) {
+    return result_of<B>(squint::absolute(x.v), x.is_constant);
+}
+template <bool B, class C>
+Counting<B> select(C condition, Counting<B> yes, Counting<B> no) {
+    if constexpr (std::is_same_v<C, bool>)
+        return varying<B>(condition ? yes.v : no.v);
+    else
+        return varying<B>(0);
+}
+template <bool B>
+Counting<B> gather(const Table& table, Counting<B> row, int column) {
+    ++counted.lookups;
+    return varying<B>(table.word(static_cast<std::int64_t>(row.v), column));
+}
+template <bool B>
+std::array<Counting<B>, 4> gather_cell(const CellTable& table, Counting<B> row, Counting<B> column) {
+    counted.lookups += 4;
+    const auto cell = squint::gather_cell(table, row.v, column.v);
+    return {varying<B>(cell[0]), varying<B>(cell[1]), varying<B>(cell[2]), varying<B>(cell[3])};
+}
+template <bool B>
+Counting<B> blend(Counting<B> v0, Counting<B> v1, Counting<B> weight, int bits) {
+    count_product(v1 - v0, weight);
+    return varying<B>(squint::blend(v0.v, v1.v, weight.v, bits));
+}
+template <bool B>
+Counting<B> affine(Counting<B> p, Counting<B> k, Counting<B> v, std::int64_t, std::int64_t) {
+    count_product(k, v);
+    return varying<B>(p.v + k.v * v.v);
+}
+template <bool B>
+Counting<B> within(Counting<B> x, std::int64_t, std::int64_t) {
+    return x;
+}
+template <bool B>
+Counting<B> bit_length(Counting<B> x) {
+    return varying<B>(squint::bit_length(x.v));
+}
+template <bool B>
+Counting<B> shift_by(Counting<B> x, Counting<B> bits) {
+    return varying<B>(B ? 0 : squint::shift_by(x.v, bits.v));
+}
+template <bool B>
+Counting<B> vector_length(const std::array<Counting<B>, 3>& v, int guard) {
+    counted.products += 3, ++counted.quotients;
+    return varying<B>(squint::vector_length(std::array{v[0].v, v[1].v, v[2].v}, guard));
+}
+template <bool B>
+Counting<B> quantise(Counting<B> x, const Rescale& to) {
+    counted.roundings += !x.is_constant && to.shift > 0 && to.rounding != Rounding::trn;
+    return result_of<B>(squint::quantise(x.v, to), x.is_constant);
+}
+template <bool B>
+Counting<B> quotient(Counting<B> numerator, Counting<B> denominator, const Rescale& to) {
+    counted.roundings += to.rounding != Rounding::trn;
+    if (!is_shift(denominator)) ++(denominator.is_constant ? counted.constant_products : counted.quotients);
+    return varying<B>(B ? 0 : squint::quotient(numerator.v, denominator.v, to));
+}
+using EveryPath = Counting<true>;
+using OnePath = Counting<false>;
+EveryPath any_word(WordTag<EveryPath>, const Range&, int) {
+    return {};
+}
+Range range_of(const EveryPath&) {
+    return {};
+}
+
+// What a run of any slab counts, its last slab alone.
+struct LastSlab : Silent {
+    std::array<Counts, kParts> counts{};
+    int part = -1;
+    void slab(const EveryPath&) { close(), counts = {}; }
+    void at(Part p) { close(), part = static_cast<int>(p); }
+    void close() {
+        if (part >= 0) {
+            Counts& c = counts[static_cast<std::size_t>(part)];
+            c.products += counted.products, c.constant_products += counted.constant_products;
+            c.quotients += counted.quotients, c.roundings += counted.roundings, c.lookups += counted.lookups;
+        }
+        counted = {};
+    }
+};
+
+Counts counts_of(const Bill& bill) {
+    std::int64_t roundings = 0;
+    for (const auto& [width, count] : bill.roundings) roundings += count;
+    return {Bill::number(bill.multipliers), Bill::number(bill.constant_multipliers),
+            Bill::number(bill.dividers), roundings, bill.lookups};
+}
+
+Plan plan_with(std::vector<std::string> settings) {
+    settings.insert(settings.begin(), "volume.dims=[16, 16, 16]");
+    const Scene scene = scene_with(built_in_scene(), settings);
+    return make_plan(scene, std::make_shared<const Volume>(load_volume(volume_source(scene))));
+}
+
+const std::vector<std::vector<std::string>> kMethods{
+    {"classification.method=pc"},
+    {"classification.method=pi1d"},
+    {"classification.method=pi1d_engel"},
+    {"classification.method=pi2d", "classification.table_size=64"},
+    {"classification.method=pi2d", "classification.table_size=64", "classification.lookup=nearest"},
+    {"classification.method=pips"},
+    {"classification.method=pips", "classification.order=2"},
+    {"classification.method=pips", "classification.order=3"},
+    {"classification.method=pips", "classification.order=5"},
+    {"classification.method=leg", "classification.order=2"},
+    {"classification.method=leg", "classification.order=4"}};
+const std::vector<std::vector<std::string>> kVariants{
+    {},
+    {"shading.model=none"},
+    {"shading.model=phong"},
+    {"shading.model=phong", "camera.projection=perspective", "camera.fov_y=30"},
+    {"shading.power=table", "shading.exponent=20", "shading.gradient=sobel"},
+    {"shading.power=parabola", "shading.gradient=analytic", "volume.spacing=[1, 1, 2]"},
+    {"shading.gradient=central_samples", "compositing.form=back_to_front"},
+    {"shading.ks=0.3", "shading.two_sided=true", "compositing.form=alpha"},
+    {"precision.preset=squeeze"},
+    {"precision.preset=eight_bit"},
+    {"sampling.interpolation=nearest", "precision.preset=wide"},
+    {"compositing.mode=mip"},
+    {"compositing.mode=average"}};
+
+std::string text_of(const std::vector<std::string>& a, const std::vector<std::string>& b) {
+    std::string text;
+    for (const auto* list : {&a, &b})
+        for (const std::string& setting : *list) text += setting + ' ';
+    return text;
+}
+
+TEST(Cost, CountsWhatAnIndependentWordCountsForEveryMethodAndModel) {
+    for (const auto& method : kMethods)
+        for (const auto& variant : kVariants) {
+            std::vector<std::string> settings = method;
+            settings.insert(settings.end(), variant.begin(), variant.end());
+            const Plan plan = plan_with(settings);
+            LastSlab every;
+            counted = {};
+            HWY_NAMESPACE::any_slab<EveryPath>(plan, every, 2);
+            every.close();
+            const sweep::Cost cost = sweep::cost_of(plan);
+            for (const sweep::StageCost& stage : cost.stages) {
+                std::size_t i = 0;
+                for (std::size_t part = 0; part < kParts; ++part) {
+                    if (kStages[stage_index(static_cast<Part>(part))] != stage.stage) continue;
+                    ASSERT_LT(i, stage.parts.size());
+                    EXPECT_EQ(counts_of(stage.parts[i].second), every.counts[part])
+                        << stage.parts[i].first << ": " << text_of(method, variant);
+                    ++i;
+                }
+            }
+        }
+}
+
+// One slab of the built-in scene, a full step long, on the path that it takes: what a reviewer counted by a
+// word of their own (docs/sweeps.md).
+TEST(Cost, OneSlabOfEveryMethodTakesTheOperationsThatWereCountedBeforehand) {
+    struct Row {
+        std::vector<std::string> settings;
+        std::int64_t products, quotients, lookups;
+    };
+    const std::vector<Row> rows{{{"classification.method=pc"}, 4, 0, 8},
+                                {{"classification.method=pi1d"}, 8, 4, 16},
+                                {{"classification.method=pips"}, 13, 4, 20},
+                                {{"classification.method=pips", "classification.order=3"}, 66, 27, 41},
+                                {{"classification.method=pips", "classification.order=5"}, 140, 54, 57},
+                                {{"classification.method=leg", "classification.order=2"}, 38, 18, 33},
+                                {{"classification.method=leg", "classification.order=4"}, 100, 39, 49}};
+    for (const Row& row : rows) {
+        const Plan plan = plan_with(row.settings);
+        const auto end = [&](double entry) {
+            return varying<false>(static_cast<std::int64_t>(
+                std::ldexp(entry, plan.specs[Wire::classification_input].format.fraction_bits)));
+        };
+        // A translucent, visible stretch of the transfer function.
+        double at = -1;
+        for (int i = 1; i + 3 < plan.entries.size() && at < 0; ++i)
+            if (plan.entries.entry[static_cast<std::size_t>(i)].is_visible() &&
+                plan.entries.entry[static_cast<std::size_t>(i) + 2].is_visible())
+                at = i;
+        ASSERT_GE(at, 0);
+        counted = {};
+        std::visit(
+            [&](const auto& method) {
+                HWY_NAMESPACE::classify(method, end(at + 0.25), end(at + 1.75),
+                                        constant<OnePath>(std::int64_t{1} << plan.location.length_fraction));
+            },
+            plan.method);
+        EXPECT_EQ(counted.products, row.products) << text_of(row.settings, {});
+        EXPECT_EQ(counted.quotients, row.quotients) << text_of(row.settings, {});
+        EXPECT_EQ(counted.lookups, row.lookups) << text_of(row.settings, {});
+    }
+}
+
+TEST(Cost, OneWhiteLightTakesEightProductsOfTwoVariableFactors) {
+    const Plan plan = plan_with({"shading.exponent=32"});
+    for (const sweep::StageCost& stage : sweep::cost_of(plan).stages) {
+        if (stage.stage != "shading") continue;
+        EXPECT_EQ(Bill::number(stage.bill.multipliers), 8) << "five squarings, and three colours by a light";
+    }
+}
+
+TEST(Cost, RoundingIsFreeByTruncationAlone) {
+    const auto bits_of = [](const char* rounding) {
+        const Plan plan = plan_with(
+            {"shading.model=none", std::string("precision.contribution=\"u1.15 ") + rounding + "\""});
+        return sweep::operation_bits(sweep::cost_of(plan).stages.back().bill);
+    };
+    EXPECT_EQ(bits_of("rnd_conv"), bits_of("trn") + 16);
+    EXPECT_EQ(bits_of("rnd"), bits_of("trn") + 16);
+}
+
+TEST(Cost, AWiderWireWidensEveryOperandItFeeds) {
+    const auto bits_of = [](const char* format) {
+        const Plan plan =
+            plan_with({"shading.model=none", std::string("precision.lerp_x=\"") + format + "\""});
+        return sweep::cost_of(plan).stages[1].bill.multiplier_bits();
+    };
+    // Two lerps along y, by weights of one integer bit and the wire's fraction.
+    const Plan plan = plan_with({});
+    const int weight = plan.specs[Wire::weight].format.width();
+    EXPECT_EQ(bits_of("u14.4"), bits_of("u12.4") + 2 * 2 * weight);
+    EXPECT_EQ(bits_of("u12.6"), bits_of("u12.4") + 2 * 2 * weight);
+}
+
+TEST(Cost, EveryWireInUseIsHeardOrStandsInATable) {
+    // Beside these a picture's audit hears every wire in use.
+    const std::vector<Wire> silent{Wire::spacing,      Wire::table_color,      Wire::table_alpha, Wire::light,
+                                   Wire::table_moment, Wire::table_extinction, Wire::material};
+    for (const auto& method : kMethods) {
+        const Plan plan = plan_with(method);
+        bool entries = false;
+        for (const Wire wire : plan.used_wires) entries = entries || wire == Wire::table_alpha;
+        EXPECT_TRUE(entries) << "table_alpha: " << text_of(method, {});
+        std::vector<Wire> costed;
+        for (const sweep::StageCost& stage : sweep::cost_of(plan).stages)
+            costed.insert(costed.end(), stage.wires.begin(), stage.wires.end());
+        EXPECT_EQ(costed, plan.used_wires);
+        RenderOptions options;
+        options.audit = true;
+        const RenderStatistics statistics = render(plan, options).statistics;
+        for (int w = 0; w < kWires; ++w) {
+            const auto wire = static_cast<Wire>(w);
+            const bool used =
+                std::find(plan.used_wires.begin(), plan.used_wires.end(), wire) != plan.used_wires.end();
+            const bool heard = statistics.wires[static_cast<std::size_t>(w)].count > 0;
+            const bool may_be_silent = std::find(silent.begin(), silent.end(), wire) != silent.end();
+            EXPECT_TRUE(used || !heard) << info(wire).name << ": " << text_of(method, {});
+            EXPECT_TRUE(heard || !used || may_be_silent) << info(wire).name << ": " << text_of(method, {});
+        }
+    }
+}
+
+}  // namespace
+}  // namespace squint
