@@ -1,0 +1,62 @@
+# Includes run one way: fixedpoint, core <- scene <- pipeline <- truth <- studies <- cli, bench.  Inside pipeline
+# the stages, the methods and the plan know no machine.  Highway stays in -inl.h files, in machines and in files
+# compiled once per target; a header with data includes neither.
+#   cmake -DSOURCE=<tree> -P tests/dependencies.cmake
+cmake_minimum_required(VERSION 3.20)
+
+set(may_fixedpoint fixedpoint)
+set(may_core core)
+set(may_scene ${may_fixedpoint} ${may_core} scene)
+set(may_pipeline ${may_scene} pipeline)
+set(may_truth ${may_pipeline} truth)
+set(may_studies ${may_truth} studies)
+set(may_cli ${may_studies} cli)
+set(may_bench ${may_studies} bench tests)  # scenes that tests draw are timed, too
+
+set(wrong "")
+macro(complain file what)
+  string(APPEND wrong "\n  ${file}: ${what}")
+endmacro()
+
+set(looked_at 0)
+foreach(room fixedpoint core scene pipeline truth studies cli bench)
+  file(GLOB_RECURSE files RELATIVE ${SOURCE} ${SOURCE}/${room}/*.h ${SOURCE}/${room}/*.cpp)
+  foreach(file ${files})
+    math(EXPR looked_at "${looked_at} + 1")
+    file(STRINGS ${SOURCE}/${file} lines REGEX "^ *# *include ")
+    string(REPLACE ";" " " text "${lines}")
+    set(is_inl FALSE)
+    if(file MATCHES "-inl\\.h$")
+      set(is_inl TRUE)
+    endif()
+    set(is_machine FALSE)
+    if(file MATCHES "^pipeline/machines/")
+      set(is_machine TRUE)
+    endif()
+    foreach(line ${lines})
+      if(line MATCHES "\"([a-z]+)/([^\"]*)\"")
+        set(to ${CMAKE_MATCH_1})
+        set(path "${CMAKE_MATCH_1}/${CMAKE_MATCH_2}")
+        if(NOT to IN_LIST may_${room})
+          complain(${file} "includes ${path}, and ${room} may include ${may_${room}}")
+        endif()
+        if(file MATCHES "^pipeline/(stages|classification|plan)/|^pipeline/slab" AND
+           path MATCHES "^pipeline/(machines/|render\\.h)")
+          complain(${file} "includes ${path}: stages, methods and the plan know no machine")
+        endif()
+        if(path MATCHES "-inl\\.h$" AND file MATCHES "\\.h$" AND NOT is_inl AND NOT is_machine AND NOT room STREQUAL bench)
+          complain(${file} "includes ${path}: a header with data includes no per-target maths")
+        endif()
+      elseif(line MATCHES "<hwy/" AND NOT is_inl AND NOT is_machine AND NOT text MATCHES "hwy/foreach_target" AND
+             NOT file STREQUAL "cli/doctor.cpp")  # it names the library's version
+        complain(${file} "includes Highway: -inl.h files, machines and files compiled per target do")
+      endif()
+    endforeach()
+  endforeach()
+endforeach()
+if(looked_at LESS 100)
+  message(FATAL_ERROR "dependencies: ${looked_at} files found under ${SOURCE}: not a tree of squint")
+endif()
+if(wrong)
+  message(FATAL_ERROR "dependencies:${wrong}")
+endif()
