@@ -328,7 +328,7 @@ void note_padding(const Volume& volume, const Values& values, std::vector<std::s
                         first = low ? rest.smallest : volume.smallest,
                         last = low ? volume.largest : rest.largest;
     if (first >= last) return;
-    const auto [least, greatest] = std::minmax(volume.value_at(first), volume.value_at(last));
+    const auto [least, greatest] = std::minmax({volume.value_at(first), volume.value_at(last)});
     notes.push_back(
         fmt::format("{}: {} voxels are {}, apart from all others ({} to {}): a padding value makes the "
                     "transfer function's "

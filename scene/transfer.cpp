@@ -67,7 +67,8 @@ void stretch(TransferFunction& function, const Scene& scene, const Volume& volum
     if (!range.of_data && range.ends.empty()) return;
     double low = 0, high = 0;
     if (range.of_data)
-        std::tie(low, high) = std::minmax(volume.value_at(volume.smallest), volume.value_at(volume.largest));
+        std::tie(low, high) =
+            std::minmax({volume.value_at(volume.smallest), volume.value_at(volume.largest)});
     else
         low = range.ends[0], high = range.ends[1];
     const double first = std::min(function.color.front().value, function.opacity.front().value),

@@ -61,7 +61,7 @@ MetEntries met_entries(const Plan& plan) {
 
 std::string data_text(const Volume& volume) {
     const auto [least, greatest] =
-        std::minmax(volume.value_at(volume.smallest), volume.value_at(volume.largest));
+        std::minmax({volume.value_at(volume.smallest), volume.value_at(volume.largest)});
     return fmt::format("{:g} to {:g}", least, greatest);
 }
 
