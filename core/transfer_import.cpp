@@ -182,7 +182,7 @@ ColorSpace color_space_of(const Json& map, const std::string& path) {
 std::vector<double> sampled(const std::vector<double>& points, ColorSpace space, const std::string& path) {
     if (space == ColorSpace::rgb || points.empty() || points.size() % 4 != 0) return points;
     const std::size_t count = points.size() / 4;
-    const std::size_t pieces = std::clamp<std::size_t>(1024 / count, 8, 64);
+    const std::size_t pieces = std::clamp<std::size_t>(4096 / count, 16, 256);
     if (space != ColorSpace::step && count * pieces > kMostPoints)
         refuse(path, fmt::format("RGBPoints has {} points, allowed is {} where they are sampled", count,
                                  kMostPoints / pieces));
