@@ -51,6 +51,33 @@ TEST_F(ReportProgram, JsonAndTheRecordsOfPointsSayTheSame) {
     }
 }
 
+// Runs of versions that kept settings as texts of TOML.
+TEST_F(ReportProgram, ReadsPointsOfTheFirstSchema) {
+    const auto commands = [&] {
+        std::vector<std::string> all;
+        const Json report = squint("report run --format json").json();
+        for (const Json& point : report["points"]) all.push_back(point.value("command", ""));
+        return all;
+    };
+    const std::vector<std::string> typed = commands();
+    ASSERT_FALSE(typed.empty());
+    for (const auto& entry : fs::directory_iterator(folder / "run/points")) {
+        Json record = Json::parse(contents(entry.path()));
+        ASSERT_EQ(record["schema"], "squint.point/2");
+        Json settings = Json::array();
+        for (const auto& [key, value] : record["settings"].items())
+            settings.push_back(key + "=" + value.dump());
+        record["schema"] = "squint.point/1", record["settings"] = settings;
+        std::ofstream(entry.path()) << record.dump();
+    }
+    const std::vector<std::string> texts = commands();
+    ASSERT_EQ(texts.size(), typed.size());
+    for (std::size_t i = 0; i < texts.size(); ++i) {
+        EXPECT_EQ(texts[i].size(), typed[i].size()) << "the same settings, in the order of the JSON";
+        EXPECT_NE(texts[i].find("--set"), std::string::npos);
+    }
+}
+
 TEST_F(ReportProgram, CommandsOfPointsRenderTheirPicturesAgain) {
     const Json report = squint("report run --format json").json();
     for (const Json& point : report["points"]) {

@@ -184,6 +184,68 @@ TEST_F(SweepProgram, ReadsEveryShippedSweepAndItsScenes) {
     EXPECT_GE(read, 8);
 }
 
+// What a sweep of 24 points may leave behind after any accident: nothing torn, no temporary, and the rest to go on with.
+const std::string kTwentyFour =
+    kBase +
+    "[[axis]]\nwires = ['color', 'transparency']\nfraction_bits = { from = 4, to = 15 }\n"
+    "[[axis]]\nwires = ['sample']\nfraction_bits = [2, 9]\n";
+
+TEST_F(SweepProgram, GoesOnAfterADiskThatWasFull) {
+    write("s.toml", kTwentyFour);
+    ASSERT_EQ(squint("sweep s.toml -o whole -q").code, 0);
+    ASSERT_EQ(squint("sweep s.toml -o run -q --shard 1/2").code, 0);
+    const auto half = points("run");
+    ASSERT_EQ(half.size(), 12u);
+    // Files of the program may not grow beyond 1 kB: its list of points cannot be written, and no record.
+    const Outcome full = shell("(trap '' XFSZ; ulimit -f 2; exec \"$SQUINT\" sweep s.toml -o run -q)");
+    EXPECT_EQ(full.code, 2);
+    EXPECT_TRUE(full.err.starts_with("squint: ")) << full.err;
+    EXPECT_NE(full.err.find("cannot write: File too large"), std::string::npos) << full.err;
+    EXPECT_EQ(std::count(full.err.begin(), full.err.end(), '\n'), 1) << full.err;
+    EXPECT_EQ(points("run"), half) << "what was there is there, whole";
+    for (const auto& entry : fs::recursive_directory_iterator(folder / "run"))
+        EXPECT_EQ(entry.path().filename().string().find(".squint-"), std::string::npos) << entry.path();
+    EXPECT_EQ(squint("sweep s.toml -o run -q").code, 0);
+    EXPECT_EQ(points("run"), points("whole"));
+}
+
+TEST_F(SweepProgram, SaysInOneLineThatItsFolderCannotBeWritten) {
+    write("s.toml", kTwentyFour);
+    expect_refusal(squint("sweep s.toml -o /proc/run -q"), "/proc/run");
+    write("file", "no folder");
+    expect_refusal(squint("sweep s.toml -o file/run -q"), "file/run");
+    if (geteuid() == 0) GTEST_SKIP() << "root may write anywhere";
+    ASSERT_EQ(squint("sweep s.toml -o run -q --shard 1/2").code, 0);
+    const auto half = points("run");
+    fs::permissions(folder / "run" / "points", fs::perms::owner_read | fs::perms::owner_exec);
+    const Outcome refused = squint("sweep s.toml -o run -q");
+    fs::permissions(folder / "run" / "points", fs::perms::owner_all);
+    EXPECT_EQ(refused.code, 2) << refused.err;
+    EXPECT_NE(refused.err.find("Permission denied"), std::string::npos) << refused.err;
+    EXPECT_EQ(points("run"), half);
+}
+
+TEST_F(SweepProgram, TwoAtOnceInOneFolderEndWithEveryPoint) {
+    write("s.toml", kTwentyFour);
+    ASSERT_EQ(squint("sweep s.toml -o whole -q").code, 0);
+    const Outcome both = shell(
+        "\"$SQUINT\" sweep s.toml -o run -q & first=$!\n\"$SQUINT\" sweep s.toml -o run -q; second=$?\n"
+        "wait $first && exit $second");
+    EXPECT_EQ(both.code, 0) << both.err;
+    EXPECT_EQ(points("run"), points("whole"));
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder / "run" / "runs"), {}), 2) << "each has a log";
+}
+
+TEST_F(SweepProgram, TakesRecordsFromBeforeAClockWasSetBack) {
+    write("s.toml", kTwentyFour);
+    ASSERT_EQ(squint("sweep s.toml -o run -q").code, 0);
+    const auto tomorrow = fs::file_time_type::clock::now() + std::chrono::hours(24);
+    for (const auto& entry : fs::recursive_directory_iterator(folder / "run"))
+        fs::last_write_time(entry.path(), tomorrow);
+    const Outcome again = squint("sweep s.toml -o run");
+    EXPECT_NE(again.err.find("0 computed, 24 there already"), std::string::npos) << again.err;
+}
+
 // Killed at 50 moments, gone on with each time: every point is there, once, whole, and what it should be.
 TEST_F(SweepProgram, EndsWithEveryPointWhereverItWasKilled) {
     write("s.toml", kBase +
