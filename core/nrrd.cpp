@@ -1,15 +1,15 @@
-// NRRD: the header is read with teem, raw data are mapped, gzip data are inflated into exactly the room they
-// need.
+// NRRD: the header is read with teem, the data are ours to take.
 #include "core/nrrd.h"
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/import/axes.h"
+#include "core/import/stored_bytes.h"
 #include "core/text.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <teem/nrrd.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <cmath>
@@ -22,11 +22,6 @@ namespace squint {
 namespace {
 
 constexpr std::size_t kLongestHeader = std::size_t{1} << 20;
-/// Deflate makes at most 1032 bytes of one (two bits for a match of 258 bytes).
-constexpr std::size_t kMostBytesPerDeflatedByte = 1032;
-constexpr std::size_t kLongestSkip = std::size_t{1} << 30;
-/// Off-axis part of a direction that counts as rounding: under a tenth of a voxel at 8,192 voxels.
-constexpr double kObliqueTolerance = 1e-5;
 
 constexpr const char* kScaleKey = "squint value scale";
 constexpr const char* kOffsetKey = "squint value offset";
@@ -93,29 +88,6 @@ void check_version(const std::string& path, const HeaderText& header) {
                                  path, printable(version.substr(0, 16))));
 }
 
-/// The data file beside the header.  A header from elsewhere must not make us read any file it likes.
-std::string data_path(const std::string& path, const std::string& name) {
-    const std::filesystem::path data(name);
-    if (name == "LIST" || name.starts_with("LIST ") || name.find('%') != std::string::npos)
-        throw InputError(fmt::format(
-            "{}: data file is \"{}\", but data in several files are not supported: one name is allowed", path,
-            excerpt(name)));
-    if (data.is_absolute() || std::find(data.begin(), data.end(), "..") != data.end())
-        throw InputError(fmt::format(
-            "{}: data file is \"{}\", but only files in the header's own folder or below are allowed", path,
-            excerpt(name)));
-    const std::filesystem::path folder = std::filesystem::path(path).parent_path(), file = folder / data;
-    std::error_code error;
-    const auto really = [&](const std::filesystem::path& p) { return std::filesystem::canonical(p, error); };
-    const std::filesystem::path home = really(folder.empty() ? "." : folder), there = really(file);
-    if (!error && std::mismatch(home.begin(), home.end(), there.begin(), there.end()).first != home.end())
-        throw InputError(fmt::format(
-            "{}: data file is \"{}\", a link to elsewhere, but only files in the header's own folder "
-            "or below are allowed: put the header beside the file that the link leads to",
-            path, excerpt(name)));
-    return file.string();  // where there is none, opening it says so
-}
-
 // --- teem
 // ------------------------------------------------------------------------------------------------------------------
 
@@ -172,81 +144,81 @@ void parse(const std::string& path, const HeaderText& header, Parsed& parsed) {
 // --------------------------------------------------------------------------------------------------
 
 void take_type(StoredVolume& stored, const Parsed& parsed) {
-    switch (parsed.nrrd->type) {
-        case nrrdTypeUChar:
-            stored.type = StoredType::u8;
-            break;
-        case nrrdTypeShort:
-            stored.type = StoredType::i16;
-            break;
-        case nrrdTypeUShort:
-            stored.type = StoredType::u16;
-            break;
-        case nrrdTypeFloat:
-            stored.type = StoredType::f32;
-            break;
-        default:
-            throw InputError(fmt::format("{}: type is {}, but uchar, short, ushort and float are allowed",
-                                         stored.where, airEnumStr(nrrdType, parsed.nrrd->type)));
-    }
-    if (stored.type != StoredType::u8 && parsed.io->endian == airEndianUnknown)
+    constexpr std::pair<int, StoredType> kTypes[] = {
+        {nrrdTypeUChar, StoredType::u8},   {nrrdTypeChar, StoredType::i8},
+        {nrrdTypeUShort, StoredType::u16}, {nrrdTypeShort, StoredType::i16},
+        {nrrdTypeUInt, StoredType::u32},   {nrrdTypeInt, StoredType::i32},
+        {nrrdTypeULLong, StoredType::u64}, {nrrdTypeLLong, StoredType::i64},
+        {nrrdTypeFloat, StoredType::f32},  {nrrdTypeDouble, StoredType::f64},
+    };
+    const auto* known = std::find_if(std::begin(kTypes), std::end(kTypes),
+                                     [&](const auto& type) { return type.first == parsed.nrrd->type; });
+    if (known == std::end(kTypes))
+        throw InputError(fmt::format("{}: type is {}, but integers and floats are allowed", stored.where,
+                                     airEnumStr(nrrdType, parsed.nrrd->type)));
+    stored.type = known->second;
+    if (parsed.io->encoding == nrrdEncodingAscii) return;
+    if (bytes_of(stored.type) > 1 && parsed.io->endian == airEndianUnknown)
         throw InputError(fmt::format("{}: endian is missing, but little or big is needed for {} bits",
                                      stored.where, bytes_of(stored.type) * 8));
     stored.big_endian = parsed.io->endian == airEndianBig;
 }
 
-void take_dims(StoredVolume& stored, const Parsed& parsed) {
-    if (parsed.nrrd->dim != 3)
+/// The axis that holds no space: of several numbers a voxel, or of times.  -1: none.
+int axis_of_components(const StoredVolume& stored, const Parsed& parsed) {
+    const Nrrd& nrrd = *parsed.nrrd;
+    if (nrrd.dim == 3) return -1;
+    if (nrrd.dim != 4)
         throw InputError(
-            fmt::format("{}: dimension is {}, but 3 is allowed", stored.where, parsed.nrrd->dim));
-    for (int axis = 0; axis < 3; ++axis) {
+            fmt::format("{}: dimension is {}, but 3 is allowed, and 4 with an axis of components",
+                        stored.where, nrrd.dim));
+    for (int axis = 0; axis < 4; ++axis) {
+        const bool no_direction =
+            parsed.seen(nrrdField_space_directions) && !AIR_EXISTS(nrrd.axis[axis].spaceDirection[0]);
+        const int kind = nrrd.axis[axis].kind;
+        if (no_direction || (kind != nrrdKindUnknown && kind != nrrdKindDomain && kind != nrrdKindSpace))
+            return axis;
+    }
+    return nrrd.axis[0].size <= 4 ? 0 : 3;  // nothing says which: a few numbers a voxel, or else times
+}
+
+/// The file's axes of space, in order.
+std::array<int, 3> axes_of_space(const StoredVolume& stored, const Parsed& parsed) {
+    const int without = axis_of_components(stored, parsed);
+    std::array<int, 3> axes{0, 1, 2};
+    for (int& axis : axes) axis += without >= 0 && axis >= without;
+    return axes;
+}
+
+void take_dims(StoredVolume& stored, const Parsed& parsed) {
+    const std::array<int, 3> axes = axes_of_space(stored, parsed);
+    const auto size_of = [&](int axis) {
         const std::size_t size = parsed.nrrd->axis[axis].size;
         if (size > static_cast<std::size_t>(std::numeric_limits<std::int64_t>::max()))
             throw InputError(
                 fmt::format("{}: axis {} has {} voxels, which is too many", stored.where, axis, size));
-        stored.dims[axis] = static_cast<std::int64_t>(size);
-    }
+        return static_cast<std::int64_t>(size);
+    };
+    for (int axis = 0; axis < 3; ++axis) stored.dims[axis] = size_of(axes[static_cast<std::size_t>(axis)]);
     checked_bytes(stored.dims, bytes_of(stored.type), stored.where);
+    const int components = axis_of_components(stored, parsed);
+    if (components < 0) return;
+    std::int64_t run = 1;
+    for (int axis = 0; axis < components; ++axis) run *= stored.dims[axis];
+    take_components(stored, size_of(components), run);
 }
 
 /// Axes from `space directions`: each along a world axis, in any order and either sense.
-void take_directions(StoredVolume& stored, const Nrrd& nrrd) {
+void take_directions(StoredVolume& stored, const Nrrd& nrrd, const std::array<int, 3>& axes) {
     if (nrrd.spaceDim != 3)
         throw InputError(
             fmt::format("{}: space dimension is {}, but 3 is allowed", stored.where, nrrd.spaceDim));
-    std::array<bool, 3> taken{};
-    for (int axis = 0; axis < 3; ++axis) {
-        const double* direction = nrrd.axis[axis].spaceDirection;
-        const Vec3 v(direction[0], direction[1], direction[2]);
-        const std::string text = fmt::format("({},{},{})", v.x, v.y, v.z);
-        if (!std::isfinite(v.x) || !std::isfinite(v.y) || !std::isfinite(v.z) || v == Vec3(0))
-            throw InputError(
-                fmt::format("{}: space direction of axis {} is {}, but must be finite and not zero",
-                            stored.where, axis, text));
-        int world = 0;
-        for (int i = 1; i < 3; ++i)
-            if (std::abs(v[i]) > std::abs(v[world])) world = i;
-        for (int i = 0; i < 3; ++i)
-            if (i != world && std::abs(v[i]) > kObliqueTolerance * std::abs(v[world]))
-                throw InputError(
-                    fmt::format("{}: axis {} is oblique, its space direction is {}, but only axes along x, y "
-                                "or z are allowed",
-                                stored.where, axis, text));
-        if (taken[world])
-            throw InputError(fmt::format("{}: axis {} with space direction {} lies along an earlier axis",
-                                         stored.where, axis, text));
-        taken[world] = true;
-        stored.axis[world] = axis;
-        stored.flipped[world] = v[world] < 0;
-        stored.spacing[world] = std::abs(v[world]);
+    for (std::size_t i = 0; i < 3; ++i) {
+        const double* step = nrrd.axis[axes[i]].spaceDirection;
+        stored.steps[i] = Vec3(step[0], step[1], step[2]);
+        stored.first_voxel[static_cast<int>(i)] = AIR_EXISTS(nrrd.spaceOrigin[i]) ? nrrd.spaceOrigin[i] : 0;
     }
-    for (int world = 0; world < 3; ++world) {
-        const double origin = nrrd.spaceOrigin[world];
-        stored.origin[world] = AIR_EXISTS(origin) ? origin : 0;
-        if (stored.flipped[world])
-            stored.origin[world] -=
-                stored.spacing[world] * static_cast<double>(stored.dims[stored.axis[world]] - 1);
-    }
+    take_axes(stored);
 }
 
 /// What `axis mins` and `axis maxs` say of an axis: a voxel is between two cell faces, or on two nodes; cells
@@ -265,10 +237,10 @@ double spacing_between_ends(const std::string& where, const NrrdAxisInfo& info, 
 }
 
 /// Axes from `spacings`, `axis mins` and `axis maxs`, in the file's order.
-void take_spacings(StoredVolume& stored, const Parsed& parsed) {
+void take_spacings(StoredVolume& stored, const Parsed& parsed, const std::array<int, 3>& axes) {
     const bool given = parsed.seen(nrrdField_spacings);
     for (int axis = 0; axis < 3; ++axis) {
-        const NrrdAxisInfo& info = parsed.nrrd->axis[axis];
+        const NrrdAxisInfo& info = parsed.nrrd->axis[axes[static_cast<std::size_t>(axis)]];
         bool cells = info.center == nrrdCenterCell;
         if (given) stored.spacing[axis] = info.spacing;
         if (AIR_EXISTS(info.max)) {
@@ -285,10 +257,11 @@ void take_spacings(StoredVolume& stored, const Parsed& parsed) {
 }
 
 void take_geometry(StoredVolume& stored, const Parsed& parsed, std::vector<std::string>& notes) {
+    const std::array<int, 3> axes = axes_of_space(stored, parsed);
     if (parsed.seen(nrrdField_space_directions))
-        take_directions(stored, *parsed.nrrd);
+        take_directions(stored, *parsed.nrrd, axes);
     else
-        take_spacings(stored, parsed);
+        take_spacings(stored, parsed, axes);
     check_spacing(stored.spacing, stored.where);
     const Vec3& o = stored.origin;
     const bool origin_given = parsed.seen(nrrdField_space_origin);
@@ -297,14 +270,10 @@ void take_geometry(StoredVolume& stored, const Parsed& parsed, std::vector<std::
         throw InputError(fmt::format("{}: origin is ({},{},{}), but must be finite", stored.where, given[0],
                                      given[1], given[2]));
     const int space = parsed.nrrd->space;
+    if (space != nrrdSpaceUnknown) stored.space = airEnumStr(nrrdSpace, space);
     if (space == nrrdSpaceLeftAnteriorSuperior || space == nrrdSpace3DLeftHanded)
         notes.push_back(
             fmt::format("{}: its space is left-handed; pictures show its mirror image", stored.where));
-    if (space == nrrdSpaceRightAnteriorSuperior || space == nrrdSpaceRightAnteriorSuperiorTime)
-        notes.push_back(fmt::format(
-            "{}: its space is right-anterior-superior and its axes are kept; those of DICOM, which are "
-            "left-posterior-superior, show it turned by half a turn about z",
-            stored.where));
 }
 
 /// Units and bits that save_nrrd kept.
@@ -342,110 +311,26 @@ std::size_t skip_lines(const MappedFile& file, std::size_t offset, unsigned line
     return offset;
 }
 
-/// A gzip stream (or several in a row) read into room that is given: what does not fit stays in the stream.
-class Inflater {
-  public:
-    Inflater(const unsigned char* data, std::size_t size, std::string where)
-        : next_(data), left_(size), where_(std::move(where)) {
-        if (inflateInit2(&stream_, 15 + 16) != Z_OK)
-            throw std::bad_alloc();  // 15: any window; + 16: gzip only
-    }
-    ~Inflater() { inflateEnd(&stream_); }
-    Inflater(const Inflater&) = delete;
-    Inflater& operator=(const Inflater&) = delete;
-
-    /// Whether the last member came to its end, its checksum and length right.
-    bool whole() const { return whole_; }
-
-    /// Bytes written: fewer than `room` only where the data end.
-    std::size_t read(unsigned char* out, std::size_t room) {
-        std::size_t done = 0;
-        while (done < room && !ended_) {
-            feed(out + done, room - done);
-            const std::size_t before = stream_.avail_out;
-            const int status = inflate(&stream_, Z_NO_FLUSH);
-            done += before - stream_.avail_out;
-            left_ -= static_cast<std::size_t>(stream_.next_in - next_);
-            next_ = stream_.next_in;
-            if (status == Z_STREAM_END)
-                end_of_member();
-            else if (status == Z_BUF_ERROR && left_ == 0)
-                ended_ = true;  // cut short: the caller counts
-            else if (status != Z_OK && status != Z_BUF_ERROR)
-                throw InputError(fmt::format("{}: gzip data are damaged: {}", where_,
-                                             stream_.msg ? stream_.msg : "unknown reason"));
-        }
-        return done;
-    }
-
-  private:
-    void feed(unsigned char* out, std::size_t room) {
-        constexpr std::size_t kMost = std::size_t{1} << 30;  // zlib counts in 32 bits
-        stream_.next_in = const_cast<unsigned char*>(next_);
-        stream_.avail_in = static_cast<unsigned>(std::min(left_, kMost));
-        stream_.next_out = out;
-        stream_.avail_out = static_cast<unsigned>(std::min(room, kMost));
-    }
-    void end_of_member() {
-        const bool another = left_ >= 2 && next_[0] == 0x1f && next_[1] == 0x8b;
-        ended_ = whole_ = !another;
-        if (another) inflateReset(&stream_);
-    }
-
-    z_stream stream_{};
-    const unsigned char* next_;
-    std::size_t left_;
-    std::string where_;
-    bool ended_ = false, whole_ = false;
-};
-
-void take_inflated(StoredVolume& stored, const MappedFile& file, std::size_t offset, std::size_t skip,
-                   const LoadLimits& limits, const std::string& where) {
-    const std::size_t packed = file.size - offset, size = stored.size();
-    if (size / kMostBytesPerDeflatedByte > packed)
-        throw InputError(fmt::format("{}: {} bytes of gzip data hold at most {} bytes of voxels, but {}",
-                                     where, packed, packed * kMostBytesPerDeflatedByte, needs(stored)));
-    check_memory(size, stored, limits);
-    if (skip > kLongestSkip)
-        throw InputError(
-            fmt::format("{}: byte skip is {}, but at most {} is allowed", where, skip, kLongestSkip));
-
-    Inflater inflater(file.bytes.get() + offset, packed, where);
-    unsigned char scratch[4096];
-    for (std::size_t left = skip; left > 0;) {
-        const std::size_t got = inflater.read(scratch, std::min(left, sizeof scratch));
-        if (got == 0)
-            throw InputError(fmt::format("{}: byte skip is {}, but the data end before", where, skip));
-        left -= got;
-    }
-    const std::shared_ptr<void> memory = allocate_voxels(size, where);
-    stored.inflated = std::shared_ptr<unsigned char>(memory, static_cast<unsigned char*>(memory.get()));
-    const std::size_t got = inflater.read(stored.inflated.get(), size);
-    if (got < size)
-        throw InputError(fmt::format("{}: {} bytes of voxels, but {}", where, got, needs(stored)));
-    if (inflater.read(scratch, 1) != 0)
-        throw InputError(fmt::format("{}: more than {} bytes of voxels, but {}", where, size, needs(stored)));
-    if (!inflater.whole())
-        throw InputError(fmt::format(
-            "{}: gzip data end before their checksum: the file is cut short, compress or copy it anew",
-            where));
-}
-
 void take_data(StoredVolume& stored, const Parsed& parsed, const MappedFile& file, std::size_t start,
                const LoadLimits& limits, const std::string& where) {
-    const std::size_t offset = skip_lines(file, start, parsed.io->lineSkip, where);
+    std::size_t offset = skip_lines(file, start, parsed.io->lineSkip, where);
     const long skip = parsed.io->byteSkip;
     if (parsed.io->encoding == nrrdEncodingGzip) {
         if (skip < 0)
             throw InputError(
                 fmt::format("{}: byte skip is {}, but must not be negative for gzip data", where, skip));
-        return take_inflated(stored, file, offset, static_cast<std::size_t>(skip), limits, where);
+        return take_inflated(stored, file, offset, file.size - offset, static_cast<std::size_t>(skip), limits,
+                             where);
+    }
+    if (parsed.io->encoding == nrrdEncodingAscii) {
+        if (skip > 0) offset += std::min(static_cast<std::size_t>(skip), file.size - offset);
+        return take_ascii(stored, file, offset, limits, where);
     }
     if (parsed.io->encoding != nrrdEncodingRaw)
-        throw InputError(fmt::format("{}: encoding is {}, but raw and gzip are allowed", stored.where,
+        throw InputError(fmt::format("{}: encoding is {}, but raw, gzip and ascii are allowed", stored.where,
                                      parsed.io->encoding->name));
     if (skip < -1) throw InputError(fmt::format("{}: byte skip is {}, but must be -1 or more", where, skip));
-    if (skip == -1 && file.size >= stored.size())
+    if (skip == -1 && file.size - offset >= stored.size())
         return take_mapped(stored, file, file.size - stored.size(), where);  // at the end
     const std::size_t bytes = skip > 0 ? static_cast<std::size_t>(skip) : 0;
     take_mapped(stored, file, bytes < file.size - offset ? offset + bytes : file.size, where);
@@ -455,23 +340,6 @@ void take_data(StoredVolume& stored, const Parsed& parsed, const MappedFile& fil
 
 bool is_nrrd(const MappedFile& file) {
     return file.size >= 4 && std::memcmp(file.bytes.get(), "NRRD", 4) == 0;
-}
-
-void take_mapped(StoredVolume& stored, const MappedFile& file, std::size_t offset, const std::string& where) {
-    const std::size_t there = file.size - offset;
-    if (there != stored.size())
-        throw InputError(fmt::format("{}: {} bytes of voxels{}, but {}{}", where, there,
-                                     offset ? fmt::format(" after the first {}", offset) : "", needs(stored),
-                                     there > stored.size() ? ": oversized" : ""));
-    stored.bytes = std::shared_ptr<const unsigned char>(file.bytes, file.bytes.get() + offset);
-    // Whole voxels of each hole.
-    const std::size_t width = bytes_of(stored.type);
-    for (const ByteRun& hole : file.holes) {
-        const std::size_t first = (std::max(hole.first, offset) - offset + width - 1) / width,
-                          end = (std::max(hole.end, offset) - offset) / width;
-        if (first < end)
-            stored.zeros.push_back({static_cast<std::int64_t>(first), static_cast<std::int64_t>(end)});
-    }
 }
 
 StoredVolume read_nrrd(const std::string& path, const MappedFile& file, const LoadLimits& limits,

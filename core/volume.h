@@ -1,10 +1,11 @@
-// A volume: unsigned integer scalars on a regular, axis-aligned grid in world space.  Knows no bits of the
+// A volume: unsigned integer scalars on a regular grid with right angles in world space.  Knows no bits of the
 // pipeline.
 #pragma once
 
 #include "core/vector.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -20,13 +21,18 @@ struct VoxelRun {
     std::int64_t first = 0, end = 0;
 };
 
+inline const std::array<Vec3, 3> kNoTurn{Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)};
+
 /// Scalars are levels: stored value minus the smallest the type or a declared window allows
 /// (docs/conventions.md#scalars-and-transfer-function). A volume is immutable and cheap to copy; its voxels are shared, in memory or mapped from a
 /// file.
 struct Volume {
     Index3 dims{0, 0, 0};   // voxels along x, y, z; x runs fastest
     Vec3 spacing{1, 1, 1};  // world units between voxel centres
-    Vec3 origin{0, 0, 0};   // world position of the first voxel's centre
+    Vec3 origin{0, 0, 0};   // position of the first voxel's centre
+    /// Unit vectors along x, y and z of the grid in world space; positions and directions in the grid's own space
+    /// are world ones turned by their inverse.  Of every file whose axes lie along the world's: no turn at all.
+    std::array<Vec3, 3> turn = kNoTurn;
     ScalarType type = ScalarType::u8;
     /// dims.x * dims.y * dims.z scalars of `type`, little-endian; 64 more bytes can be read.
     std::shared_ptr<const void> data;
@@ -38,6 +44,8 @@ struct Volume {
     double value_scale = 1;  // file's value = value_scale * scalar + value_offset (HU where declared)
     double value_offset = 0;
     std::string name;          // for messages: a path or a procedural name
+    std::string space;         // its world axes where the file states them: "left-posterior-superior"
+    std::string modality;      // what DICOM states: "CT", "MR"; otherwise empty
     std::string content_hash;  // of dims, type and voxels: names the data wherever it lies
 
     std::int64_t voxels() const { return dims.x * dims.y * dims.z; }
@@ -66,6 +74,12 @@ struct Volume {
 
     double value_at(double scalar) const { return value_scale * scalar + value_offset; }  // file's units
 
+    bool turned() const { return turn != kNoTurn; }
+    /// A vector of the grid's own space in world space, and back.
+    Vec3 world_from_grid(const Vec3& v) const { return turn[0] * v.x + turn[1] * v.y + turn[2] * v.z; }
+    Vec3 grid_from_world(const Vec3& v) const { return Vec3(turn[0].dot(v), turn[1].dot(v), turn[2].dot(v)); }
+
+    // "World" is the grid's own space here; the two differ for a turned volume alone.
     Vec3 voxel_from_world(const Vec3& p) const { return (p - origin) / spacing; }
     Vec3 world_from_voxel(const Vec3& p) const { return origin + p * spacing; }
 

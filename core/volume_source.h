@@ -12,17 +12,21 @@ namespace squint {
 
 /// Exactly one of `file`, `procedural` is set.  Everything but these two has a default.
 struct VolumeSource {
-    std::string file = {};                // NRRD (.nrrd, .nhdr) or raw; variables already expanded
+    std::string file = {};                // a file or folder, variables already expanded: docs/formats.md
     std::string procedural = "phantom";   // used when `file` is empty; names in procedural.h
     std::vector<std::int64_t> dims = {};  // raw: required; procedural: optional (one number or three)
-    std::string type = {};                // raw: u8, i16, u16, f32
+    std::string type = {};                // raw: u8, i8, u16, i16, u32, i32, u64, i64, f32, f64
     std::string endian = "little";        // raw: little, big
     std::int64_t offset = 0;              // raw: bytes to skip
     std::vector<double> spacing = {};     // raw: default 1 1 1; otherwise overrides the file's
-    std::vector<double> window = {};      // [least, greatest] in the file's units; required for f32
-    int bits = 0;  // float data: bits to quantise the window to (required there, 1 to 16)
+    std::vector<double> window = {};      // [least, greatest] in the file's units; floats: default all finite
+    int bits = 0;                         // float data: bits the window is quantised to, 1 to 16; 0: 16
     /// value = value_scale * stored + value_offset; absent: what the file declares, or 1 and 0.
     std::optional<double> value_scale = {}, value_offset = {};
+    std::optional<double> nan = {};     // the value of voxels that are not a number
+    std::optional<int> component = {};  // of files with several numbers a voxel or several times
+    int series = 0;                     // DICOM: which of the series listed, from 1; 0: the only one
+    std::string space = "file";         // world axes: as the file states them, or turned to "lps"
 };
 
 struct LoadLimits {

@@ -14,11 +14,52 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <type_traits>
 
 namespace squint {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "levels lie in memory as little-endian words");
+
+/// Levels are numbers of 16 bits.
+constexpr std::int64_t kMostLevels = 65536;
+
+// --- Types
+// -----------------------------------------------------------------------------------------------------------
+
+/// visit(T{}) with the type of a stored voxel.
+template <class Visit>
+auto with_type(StoredType type, const Visit& visit) {
+    switch (type) {
+        case StoredType::u8:
+            return visit(std::uint8_t{});
+        case StoredType::i8:
+            return visit(std::int8_t{});
+        case StoredType::u16:
+            return visit(std::uint16_t{});
+        case StoredType::i16:
+            return visit(std::int16_t{});
+        case StoredType::u32:
+            return visit(std::uint32_t{});
+        case StoredType::i32:
+            return visit(std::int32_t{});
+        case StoredType::u64:
+            return visit(std::uint64_t{});
+        case StoredType::i64:
+            return visit(std::int64_t{});
+        case StoredType::f32:
+            return visit(float{});
+        default:
+            return visit(double{});
+    }
+}
+
+bool is_float(StoredType type) {
+    return type == StoredType::f32 || type == StoredType::f64;
+}
+bool is_signed(StoredType type) {
+    return with_type(type, [](auto voxel) { return std::is_signed_v<decltype(voxel)>; });
+}
 
 // --- Reading stored voxels
 // -----------------------------------------------------------------------------------------------
@@ -30,14 +71,17 @@ struct Reader {
 
     T operator()(std::int64_t index) const {
         if constexpr (sizeof(T) == 1) {
-            return bytes[index];
+            return static_cast<T>(bytes[index]);
         } else {
-            using Word = std::conditional_t<sizeof(T) == 2, std::uint16_t, std::uint32_t>;
+            using Word = std::conditional_t<sizeof(T) == 2, std::uint16_t,
+                                            std::conditional_t<sizeof(T) == 4, std::uint32_t, std::uint64_t>>;
             Word word;
             std::memcpy(&word, bytes + index * static_cast<std::int64_t>(sizeof(T)), sizeof(T));
-            if (swapped)
-                word = sizeof(T) == 2 ? static_cast<Word>(__builtin_bswap16(static_cast<std::uint16_t>(word)))
-                                      : static_cast<Word>(__builtin_bswap32(word));
+            if (swapped) {
+                if constexpr (sizeof(T) == 2) word = __builtin_bswap16(word);
+                if constexpr (sizeof(T) == 4) word = __builtin_bswap32(word);
+                if constexpr (sizeof(T) == 8) word = __builtin_bswap64(word);
+            }
             return std::bit_cast<T>(word);
         }
     }
@@ -51,10 +95,12 @@ Reader<T> reader(const StoredVolume& stored) {
 /// Where the voxel (x, y, z) of world order lies in the file: first + x * step.x + y * step.y + z * step.z.
 struct FileOrder {
     Index3 dims, step;
-    std::int64_t first = 0;
+    std::int64_t first;
 
-    explicit FileOrder(const StoredVolume& stored) {
-        const Index3 stride{1, stored.dims.x, stored.dims.x * stored.dims.y};
+    explicit FileOrder(const StoredVolume& stored) : first(stored.component * stored.component_run) {
+        Index3 stride{1, stored.dims.x, stored.dims.x * stored.dims.y};
+        for (int axis = 0; axis < 3; ++axis)
+            if (stride[axis] >= stored.component_run) stride[axis] *= stored.components;
         for (int world = 0; world < 3; ++world) {
             const int axis = stored.axis[world];
             dims[world] = stored.dims[axis];
@@ -63,6 +109,25 @@ struct FileOrder {
         }
     }
 };
+
+/// The numbers of the component that is meant, side by side: fold(so far, number) over all, then
+/// join(a, b).
+template <class T, class Part, class Fold, class Join>
+Part reduce_voxels(const StoredVolume& stored, const Part& none, const Fold& fold, const Join& join) {
+    const Reader<T> read = reader<T>(stored);
+    const FileOrder file(stored);
+    return tbb::parallel_reduce(
+        tbb::blocked_range<std::int64_t>(0, file.dims.y * file.dims.z, 64), none,
+        [&](const auto& rows, Part part) {
+            for (std::int64_t row = rows.begin(); row < rows.end(); ++row) {
+                const std::int64_t y = row % file.dims.y, z = row / file.dims.y;
+                std::int64_t index = file.first + y * file.step.y + z * file.step.z;
+                for (std::int64_t x = 0; x < file.dims.x; ++x, index += file.step.x) fold(part, read(index));
+            }
+            return part;
+        },
+        join);
+}
 
 /// levels[world order] = convert(voxel, its index in the file), rows side by side.
 template <class T, class Scalar, class Convert>
@@ -84,6 +149,29 @@ void convert_voxels(const StoredVolume& stored, void* levels, const Convert& con
     });
 }
 
+/// Memory for the levels: the file's own where each level takes the place of its voxel, otherwise new.
+std::shared_ptr<void> room_for_levels(const StoredVolume& stored, const Volume& volume,
+                                      const LoadLimits& limits) {
+    const std::size_t bytes = stored.voxels() * volume.scalar_bytes();
+    if (stored.inflated && !stored.reordered() && stored.components == 1 &&
+        bytes_of(stored.type) == volume.scalar_bytes())
+        return stored.inflated;
+    check_memory(bytes + (stored.inflated ? stored.size() : 0), stored, limits);
+    return allocate_voxels(bytes, stored.where);
+}
+
+template <class Convert>
+void convert_all(Volume& volume, const StoredVolume& stored, const LoadLimits& limits,
+                 const Convert& convert) {
+    const std::shared_ptr<void> levels = room_for_levels(stored, volume, limits);
+    with_type(stored.type, [&](auto voxel) {
+        using T = decltype(voxel);
+        if (volume.type == ScalarType::u8) convert_voxels<T, std::uint8_t>(stored, levels.get(), convert);
+        if (volume.type == ScalarType::u16) convert_voxels<T, std::uint16_t>(stored, levels.get(), convert);
+    });
+    volume.data = levels;
+}
+
 // --- Integers: subtract the least
 // ------------------------------------------------------------------------------------------
 
@@ -93,43 +181,40 @@ struct Shift {
 
     template <class T>
     std::int64_t operator()(T voxel, std::int64_t, std::int64_t& clamped) const {
-        clamped += voxel < least || voxel > greatest;
-        return std::clamp<std::int64_t>(voxel, least, greatest) - least;
+        if constexpr (std::is_same_v<T, std::uint64_t>)
+            voxel = std::min<T>(voxel, std::numeric_limits<std::int64_t>::max());
+        const auto value = static_cast<std::int64_t>(voxel);
+        clamped += value < least || value > greatest;
+        return std::clamp(value, least, greatest) - least;
     }
     void count(std::int64_t clamped) const { outside.fetch_add(clamped, std::memory_order_relaxed); }
 };
-
-std::int16_t least_of(const StoredVolume& stored) {
-    const Reader<std::int16_t> read = reader<std::int16_t>(stored);
-    constexpr std::int16_t kGreatest = std::numeric_limits<std::int16_t>::max();
-    return tbb::parallel_reduce(
-        tbb::blocked_range<std::int64_t>(0, static_cast<std::int64_t>(stored.voxels()), 1 << 16), kGreatest,
-        [&](const auto& range, std::int16_t least) {
-            for (std::int64_t i = range.begin(); i < range.end(); ++i) least = std::min(least, read(i));
-            return least;
-        },
-        [](std::int16_t a, std::int16_t b) { return std::min(a, b); });
-}
 
 // --- Floats: round to the levels of a window
 // ---------------------------------------------------------------------------------
 
 struct Quantise {
-    double scale, offset;           // file's units from stored
-    double least, levels_per_unit;  // of the window, in the file's units
+    double scale, offset;                     // file's units from stored
+    double least, greatest, levels_per_unit;  // of the window, in the file's units
     double last_level;
+    double nan;  // in the file's units, what stands for a voxel that is not a number; or none
     std::atomic<std::int64_t>& outside;
-    std::atomic<std::int64_t>& not_finite;  // least index in the file
+    std::atomic<std::int64_t>& not_a_number;  // least index in the file
 
-    std::int64_t operator()(float voxel, std::int64_t index, std::int64_t& clamped) const {
-        if (!std::isfinite(voxel)) {
-            for (std::int64_t seen = not_finite;
-                 index < seen && !not_finite.compare_exchange_weak(seen, index);) {
+    template <class T>
+    std::int64_t operator()(T voxel, std::int64_t index, std::int64_t& clamped) const {
+        double value = scale * static_cast<double>(voxel) + offset;
+        if (std::isnan(value)) {
+            if (std::isnan(nan)) {
+                for (std::int64_t seen = not_a_number;
+                     index < seen && !not_a_number.compare_exchange_weak(seen, index);) {
+                }
+                return 0;
             }
-            return 0;
+            value = nan;
         }
-        const double level = (scale * static_cast<double>(voxel) + offset - least) * levels_per_unit;
-        clamped += level < 0 || level > last_level;
+        const double level = (value - least) * levels_per_unit;
+        clamped += value < least || value > greatest;
         const double inside = std::clamp(level, 0.0, last_level), whole = std::floor(inside);
         return static_cast<std::int64_t>(whole) + (inside - whole >= 0.5);
     }
@@ -145,6 +230,7 @@ struct Values {
     bool windowed = false;
     double least = 0, greatest = 0;  // of the window, in the file's units
     int bits = 0;                    // declared, or 0
+    double nan = std::numeric_limits<double>::quiet_NaN();
 };
 
 Values settle(const StoredVolume& stored, const VolumeSource& source) {
@@ -168,6 +254,7 @@ Values settle(const StoredVolume& stored, const VolumeSource& source) {
     values.bits = source.bits != 0 ? source.bits : values.windowed ? 0 : stored.scalar_bits;
     if (values.bits < 0 || values.bits > 16)
         throw InputError(fmt::format("{}: bits is {}, but 1 to 16 are allowed", stored.where, values.bits));
+    if (source.nan) values.nan = *source.nan;
     return values;
 }
 
@@ -179,81 +266,156 @@ void note_clamped(const StoredVolume& stored, const Values& values, std::int64_t
                         stored.where, clamped, stored.voxels(), values.least, values.greatest));
 }
 
-/// Memory for the levels: the file's own where each level takes the place of its voxel, otherwise new.
-std::shared_ptr<void> room_for_levels(const StoredVolume& stored, const Volume& volume,
-                                      const LoadLimits& limits) {
-    const std::size_t bytes = stored.voxels() * volume.scalar_bytes();
-    if (stored.inflated && !stored.reordered() && bytes_of(stored.type) == volume.scalar_bytes())
-        return stored.inflated;
-    check_memory(bytes + (stored.inflated ? stored.size() : 0), stored, limits);
-    return allocate_voxels(bytes, stored.where);
+/// The window of floats that have none: from the least to the greatest finite value.
+void window_from_data(Values& values, const StoredVolume& stored) {
+    struct Range {
+        double least = std::numeric_limits<double>::infinity(),
+               greatest = -std::numeric_limits<double>::infinity();
+        bool nan = false;
+    };
+    const Range range = with_type(stored.type, [&](auto voxel) {
+        return reduce_voxels<decltype(voxel)>(
+            stored, Range{},
+            [](Range& r, auto v) {
+                const auto number = static_cast<double>(v);
+                if (std::isfinite(number))
+                    r.least = std::min(r.least, number), r.greatest = std::max(r.greatest, number);
+                r.nan = r.nan || std::isnan(number);
+            },
+            [](const Range& a, const Range& b) {
+                return Range{std::min(a.least, b.least), std::max(a.greatest, b.greatest), a.nan || b.nan};
+            });
+    });
+    double ends[2] = {values.scale * range.least + values.offset,
+                      values.scale * range.greatest + values.offset};
+    if (range.nan && !std::isnan(values.nan)) {
+        if (!(range.least <= range.greatest)) ends[0] = ends[1] = values.nan;
+        ends[0] = std::min(ends[0], values.nan), ends[1] = std::max(ends[1], values.nan);
+    } else if (!(range.least <= range.greatest)) {
+        if (range.nan) ends[0] = 0, ends[1] = 1;  // the first such voxel is refused by its place
+    }
+    values.least = std::min(ends[0], ends[1]), values.greatest = std::max(ends[0], ends[1]);
+    if (values.least == values.greatest) values.greatest += std::max(1.0, std::abs(values.least));
+    if (!std::isfinite(values.greatest - values.least))
+        throw InputError(
+            fmt::format("{}: no finite range of values; window = [least, greatest] gives one", stored.where));
 }
 
-void quantise_floats(Volume& volume, const StoredVolume& stored, const Values& values,
-                     const LoadLimits& limits, std::vector<std::string>& notes) {
-    if (!values.windowed || values.bits == 0)
-        throw InputError(fmt::format(
-            "{}: float voxels, but {} missing: float data need window = [least, greatest] and bits = 1 to 16",
-            stored.where,
-            values.windowed ? "bits is"
-            : values.bits   ? "window is"
-                            : "window and bits are"));
+/// Floats, and integers whose range needs more levels than there are.
+void quantise(Volume& volume, const StoredVolume& stored, Values values, const LoadLimits& limits,
+              std::vector<std::string>& notes) {
+    const bool from_data = !values.windowed;
+    if (from_data) window_from_data(values, stored);
+    if (values.bits == 0) values.bits = 16;
     const double last_level = (1 << values.bits) - 1;
-    std::atomic<std::int64_t> outside{0}, not_finite{std::numeric_limits<std::int64_t>::max()};
-    const Quantise quantise{
-        values.scale, values.offset, values.least, last_level / (values.greatest - values.least),
-        last_level,   outside,       not_finite};
+    constexpr std::int64_t kNowhere = std::numeric_limits<std::int64_t>::max();
+    std::atomic<std::int64_t> outside{0}, not_a_number{kNowhere};
+    const Quantise convert{values.scale,
+                           values.offset,
+                           values.least,
+                           values.greatest,
+                           last_level / (values.greatest - values.least),
+                           last_level,
+                           values.nan,
+                           outside,
+                           not_a_number};
     volume.type = values.bits <= 8 ? ScalarType::u8 : ScalarType::u16;
     volume.scalar_bits = values.bits;
     volume.value_scale = (values.greatest - values.least) / last_level;
     volume.value_offset = values.least;
-    const std::shared_ptr<void> levels = room_for_levels(stored, volume, limits);
-    if (volume.type == ScalarType::u8) convert_voxels<float, std::uint8_t>(stored, levels.get(), quantise);
-    if (volume.type == ScalarType::u16) convert_voxels<float, std::uint16_t>(stored, levels.get(), quantise);
-    volume.data = levels;
+    convert_all(volume, stored, limits, convert);
 
-    if (const std::int64_t at = not_finite; at < static_cast<std::int64_t>(stored.voxels()))
-        throw InputError(fmt::format("{}: voxel ({}, {}, {}) is {}, but every voxel must be finite",
-                                     stored.where, at % stored.dims.x, at / stored.dims.x % stored.dims.y,
-                                     at / stored.dims.x / stored.dims.y, reader<float>(stored)(at)));
-    notes.push_back(
-        fmt::format("{}: float voxels were quantised to {} bits over [{}, {}]: one level is {:.6g}",
-                    stored.where, values.bits, values.least, values.greatest, volume.value_scale));
+    if (std::int64_t at = not_a_number; at != kNowhere) {
+        const std::int64_t run = stored.component_run;
+        if (stored.components > 1) at = at / (run * stored.components) * run + at % run;
+        throw InputError(fmt::format(
+            "{}: voxel ({}, {}, {}) is nan, but every voxel needs a value: volume.nan = VALUE gives it one",
+            stored.where, at % stored.dims.x, at / stored.dims.x % stored.dims.y,
+            at / stored.dims.x / stored.dims.y));
+    }
+    notes.push_back(fmt::format(
+        "{}: {} voxels were quantised to {} bits over [{}, {}]{}: one level is {:.6g}", stored.where,
+        stored.type == StoredType::f32   ? "float"
+        : stored.type == StoredType::f64 ? "double"
+                                         : "integer",
+        values.bits, values.least, values.greatest, from_data ? ", their finite range" : "",
+        volume.value_scale));
     note_clamped(stored, values, outside, notes);
+}
+
+/// Least and greatest number; u64 beyond i64 counts as its largest.
+std::pair<std::int64_t, std::int64_t> measured_range(const StoredVolume& stored) {
+    using Range = std::pair<std::int64_t, std::int64_t>;
+    static constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
+    return with_type(stored.type, [&](auto voxel) {
+        using T = decltype(voxel);
+        return reduce_voxels<T>(
+            stored, Range{kMost, std::numeric_limits<std::int64_t>::min()},
+            [](Range& r, T v) {
+                if constexpr (std::is_same_v<T, std::uint64_t>) v = std::min<T>(v, kMost);
+                const auto number = static_cast<std::int64_t>(v);
+                r.first = std::min(r.first, number), r.second = std::max(r.second, number);
+            },
+            [](const Range& a, const Range& b) {
+                return Range{std::min(a.first, b.first), std::max(a.second, b.second)};
+            });
+    });
 }
 
 /// The stored values that levels begin and end at.
 std::pair<std::int64_t, std::int64_t> stored_range(const StoredVolume& stored, const Values& values) {
     if (values.windowed) {
-        // One level is one stored value: the window snaps to the nearest ones, within what 18 bits hold.
+        // One level is one stored value: the window snaps to the nearest ones, within what 18 bits (of wide
+        // integers 62) hold.
+        const double most = bytes_of(stored.type) <= 2 ? 131072.0 : 0x1p62;
         const auto nearest = [&](double value) {
             return static_cast<std::int64_t>(
-                std::floor(std::clamp((value - values.offset) / values.scale, -131072.0, 131072.0) + 0.5));
+                std::floor(std::clamp((value - values.offset) / values.scale, -most, most) + 0.5));
         };
         const auto [least, greatest] = std::minmax({nearest(values.least), nearest(values.greatest)});
         return {least, greatest};
     }
-    if (stored.type == StoredType::i16) return {least_of(stored), std::numeric_limits<std::int16_t>::max()};
-    return {0, stored.type == StoredType::u8 ? 255 : 65535};
+    switch (stored.type) {
+        case StoredType::u8:
+            return {0, 255};
+        case StoredType::u16:
+            return {0, 65535};
+        case StoredType::i8:
+            return {measured_range(stored).first, 127};
+        case StoredType::i16:
+            return {measured_range(stored).first, 32767};
+        default:
+            break;
+    }
+    const auto [least, greatest] = measured_range(stored);
+    return {is_signed(stored.type) ? least : 0, greatest};
 }
 
 void shift_integers(Volume& volume, const StoredVolume& stored, const Values& values,
-                    const LoadLimits& limits, std::vector<std::string>& notes) {
-    const auto [least, greatest] = stored_range(stored, values);
-    const std::int64_t most = stored.type == StoredType::u8 ? 255 : 65535;
-    if (greatest <= least || greatest - least > most)
+                    std::pair<std::int64_t, std::int64_t> range, const LoadLimits& limits,
+                    std::vector<std::string>& notes) {
+    const auto [least, greatest] = range;
+    const bool narrow = bytes_of(stored.type) == 1;
+    const std::uint64_t most = narrow ? 255 : kMostLevels - 1,
+                        spans = static_cast<std::uint64_t>(greatest) - static_cast<std::uint64_t>(least);
+    if (values.windowed && (greatest <= least || spans > most))
         throw InputError(fmt::format("{}: window [{}, {}] spans {} stored values, but 2 to {} are allowed",
-                                     stored.where, values.least, values.greatest, greatest - least + 1,
-                                     most + 1));
-    volume.type = stored.type == StoredType::u8 ? ScalarType::u8 : ScalarType::u16;
+                                     stored.where, values.least, values.greatest, spans + 1, most + 1));
+    if (spans > most)
+        throw InputError(
+            fmt::format("{}: stored values from {} to {} need {} bits, but 16 are allowed: "
+                        "window = [least, greatest] keeps some, and with bits = 16 rounds more",
+                        stored.where, least, greatest, bits_for(spans)));
+    volume.type = narrow ? ScalarType::u8 : ScalarType::u16;
     volume.value_scale = values.scale;
     volume.value_offset = values.offset + values.scale * static_cast<double>(least);
 
     // Levels already: taken as they are, without a copy.
     const unsigned char* bytes = stored.inflated ? stored.inflated.get() : stored.bytes.get();
     const bool aligned = reinterpret_cast<std::uintptr_t>(bytes) % bytes_of(stored.type) == 0;
-    const bool swapped = stored.big_endian && stored.type != StoredType::u8;
-    if (stored.type != StoredType::i16 && !values.windowed && !stored.reordered() && !swapped && aligned) {
+    const bool levels =
+        stored.type == StoredType::u8 || (stored.type == StoredType::u16 && !stored.big_endian);
+    if (levels && !values.windowed && !stored.reordered() && stored.components == 1 && aligned) {
         volume.data = stored.inflated ? std::shared_ptr<const void>(stored.inflated)
                                       : std::shared_ptr<const void>(stored.bytes);
         volume.mapped = !stored.inflated;
@@ -261,25 +423,15 @@ void shift_integers(Volume& volume, const StoredVolume& stored, const Values& va
         return;
     }
     std::atomic<std::int64_t> outside{0};
-    const Shift shift{least, greatest, outside};
-    const std::shared_ptr<void> levels = room_for_levels(stored, volume, limits);
-    if (stored.type == StoredType::u8)
-        convert_voxels<std::uint8_t, std::uint8_t>(stored, levels.get(), shift);
-    if (stored.type == StoredType::i16)
-        convert_voxels<std::int16_t, std::uint16_t>(stored, levels.get(), shift);
-    if (stored.type == StoredType::u16)
-        convert_voxels<std::uint16_t, std::uint16_t>(stored, levels.get(), shift);
-    volume.data = levels;
+    convert_all(volume, stored, limits, Shift{least, greatest, outside});
     note_clamped(stored, values, outside, notes);
 }
 
 /// Integer bits that hold the window where one is declared, otherwise the data; 8 at least.
-void choose_bits(Volume& volume, const StoredVolume& stored, const Values& values) {
+void choose_bits(Volume& volume, const StoredVolume& stored, const Values& values,
+                 std::pair<std::int64_t, std::int64_t> range) {
     std::uint64_t largest = volume.largest;
-    if (values.windowed) {
-        const auto [least, greatest] = stored_range(stored, values);
-        largest = static_cast<std::uint64_t>(greatest - least);
-    }
+    if (values.windowed) largest = static_cast<std::uint64_t>(range.second - range.first);
     if (values.bits != 0 && values.bits < bits_for(largest))
         throw InputError(fmt::format("{}: bits is {}, but scalars to {} need {}", stored.where, values.bits,
                                      largest, bits_for(largest)));
@@ -340,11 +492,13 @@ void note_padding(const Volume& volume, const Values& values, std::vector<std::s
 }  // namespace
 
 std::size_t bytes_of(StoredType type) {
-    return type == StoredType::u8 ? 1 : type == StoredType::f32 ? 4 : 2;
+    return with_type(type, [](auto voxel) { return sizeof voxel; });
 }
 
 std::string needs(const StoredVolume& stored) {
-    return fmt::format("{} of {} bits needs {}", text_of(stored.dims), bytes_of(stored.type) * 8,
+    const std::string times =
+        stored.components > 1 ? fmt::format(" and {} components", stored.components) : "";
+    return fmt::format("{} of {} bits{} needs {}", text_of(stored.dims), bytes_of(stored.type) * 8, times,
                        stored.size());
 }
 
@@ -362,17 +516,24 @@ Volume levels_from_stored(const StoredVolume& stored, const VolumeSource& source
     volume.dims = FileOrder(stored).dims;
     volume.spacing = stored.spacing;
     volume.origin = stored.origin;
+    volume.turn = stored.turn;
+    volume.space = stored.space;
+    volume.modality = stored.modality;
     if (stored.reordered())
         notes.push_back(
             fmt::format("{}: axes are permuted or flipped; voxels were put in x, y, z order", stored.where));
 
-    if (stored.type == StoredType::f32) {
-        quantise_floats(volume, stored, values, limits, notes);
+    const bool floats = is_float(stored.type);
+    const auto range = floats ? std::pair<std::int64_t, std::int64_t>{} : stored_range(stored, values);
+    const bool rounded =
+        !floats && bytes_of(stored.type) > 2 && values.bits != 0 && range.second - range.first >= kMostLevels;
+    if (floats || rounded) {
+        quantise(volume, stored, values, limits, notes);
         measure(volume);
     } else {
-        shift_integers(volume, stored, values, limits, notes);
+        shift_integers(volume, stored, values, range, limits, notes);
         measure(volume);
-        choose_bits(volume, stored, values);
+        choose_bits(volume, stored, values, range);
         note_padding(volume, values, notes);
     }
     return volume;

@@ -6,10 +6,13 @@
 
 #include <array>
 #include <optional>
+#include <string_view>
 
 namespace squint {
 
-enum class StoredType { u8, i16, u16, f32 };
+enum class StoredType { u8, i8, u16, i16, u32, i32, u64, i64, f32, f64 };
+inline constexpr std::string_view kStoredTypes[] = {"u8",  "i8",  "u16", "i16", "u32",
+                                                    "i32", "u64", "i64", "f32", "f64"};
 std::size_t bytes_of(StoredType type);
 
 /// What a header says, and the bytes it speaks of.
@@ -17,20 +20,32 @@ struct StoredVolume {
     std::string where;  // the file, for messages
     StoredType type = StoredType::u8;
     bool big_endian = false;
-    Index3 dims{0, 0, 0};                             // along the file's axes, the fastest first
-    std::array<int, 3> axis{0, 1, 2};                 // the file's axis that lies along world x, y, z
-    std::array<bool, 3> flipped{};                    // that axis runs against its world axis
-    Vec3 spacing{1, 1, 1};                            // along world x, y, z
-    Vec3 origin{0, 0, 0};                             // world position of the voxel with the least x, y, z
+    Index3 dims{0, 0, 0};                // along the file's axes, the fastest first
+    std::array<int, 3> axis{0, 1, 2};    // the file's axis that lies along world x, y, z
+    std::array<bool, 3> flipped{};       // that axis runs against its world axis
+    Vec3 spacing{1, 1, 1};               // along world x, y, z
+    Vec3 origin{0, 0, 0};                // position of the voxel with the least x, y, z
+    std::array<Vec3, 3> turn = kNoTurn;  // see Volume
+    // What those five follow from, where the file says it: the step of each axis and the first voxel's place in
+    // world space (take_axes).
+    std::array<Vec3, 3> steps = kNoTurn;
+    Vec3 first_voxel{0, 0, 0};
     std::optional<double> value_scale, value_offset;  // declared in the file; a scene's own go before them
     int scalar_bits = 0;                              // declared in the file, or 0
+    std::string space;     // the world axes' names where the file states them: "left-posterior-superior"
+    std::string modality;  // of DICOM: "CT", "MR"; otherwise empty
+
+    // A fourth axis, of components or points in time: between two neighbours on it lie `component_run` numbers
+    // (1 where the components of a voxel are side by side), and the one numbered `component` is meant.
+    std::int64_t components = 1, component_run = 1, component = 0;
+    bool component_chosen = false;  // by the reader, which read that one alone
 
     std::shared_ptr<const unsigned char> bytes;  // mapped from the file, or
     std::vector<VoxelRun> zeros;                 // of those: voxels whose bytes are zeros on no disk, or
     std::shared_ptr<unsigned char> inflated;     // in memory of our own, which may be changed in place
 
     std::size_t voxels() const { return static_cast<std::size_t>(dims.x * dims.y * dims.z); }
-    std::size_t size() const { return voxels() * bytes_of(type); }
+    std::size_t size() const { return voxels() * static_cast<std::size_t>(components) * bytes_of(type); }
     bool reordered() const { return axis != std::array{0, 1, 2} || flipped != std::array<bool, 3>{}; }
 };
 

@@ -16,6 +16,8 @@ constexpr Limits kLimits[] = {
     {"volume.offset", 0},
     {"volume.spacing", 0, kNone, true},
     {"volume.bits", 0, 16},
+    {"volume.component", 0, 65535},
+    {"volume.series", 0, 100000},
     {"transfer_function.unit_distance", 0},
     {"transfer_function.entries", 2, 65536, false, false, 0},
     {"camera.azimuth", -36000, 36000},
@@ -59,7 +61,8 @@ const Limits& limits_of(std::string_view key) {
 }
 
 std::vector<std::string_view> words_of(std::string_view key) {
-    if (key == "volume.type") return {"u8", "i16", "u16", "f32"};
+    if (key == "volume.type") return {"u8", "i8", "u16", "i16", "u32", "i32", "u64", "i64", "f32", "f64"};
+    if (key == "volume.space") return {"file", "lps"};
     if (key == "volume.procedural") {
         std::vector<std::string_view> names;
         for (const ProceduralField& field : procedural_fields()) names.push_back(field.name);

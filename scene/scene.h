@@ -168,20 +168,31 @@ bool operator==(const Scene& a, const Scene& b);
 template <class S, class V>
 void visit_scene(S& scene, V&& visit) {
     auto& volume = scene.volume;
-    visit("volume.file", volume.file, "NRRD (attached or detached) or raw file; ${VARIABLE} expands");
+    visit("volume.file", volume.file,
+          "NRRD, MetaImage, NIfTI, DICOM, VTI or raw file, or a folder of DICOM, TIFF or PNG slices; "
+          "${VARIABLE} expands");
     visit("volume.procedural", volume.procedural, "built-in volume, used when no file is named");
     visit("volume.dims", volume.dims, "voxels along x, y, z: required for raw, optional for procedural");
-    visit("volume.type", volume.type, "raw files: u8, i16, u16 or f32");
+    visit("volume.type", volume.type, "raw files: u8, i8, u16, i16, u32, i32, u64, i64, f32 or f64");
     visit("volume.endian", volume.endian, "raw files: little or big");
     visit("volume.offset", volume.offset, "raw files: bytes before the first voxel");
     visit("volume.spacing", volume.spacing, "world units between voxels along x, y, z; overrides the file's");
-    visit("volume.window", volume.window, "[least, greatest] stored value kept; required for float data");
-    visit("volume.bits", volume.bits, "float and procedural data: bits the values are quantised to");
+    visit("volume.window", volume.window,
+          "[least, greatest] value kept; of floats that have none: all finite ones");
+    visit("volume.bits", volume.bits,
+          "float and procedural data: bits the values are quantised to; 0: 16 for floats");
     visit("volume.scale", volume.value_scale,
           "value = scale * stored + value_offset, in the file's units (HU); default: what the file declares, "
           "or "
           "1");
     visit("volume.value_offset", volume.value_offset, "see scale; default: what the file declares, or 0");
+    visit("volume.nan", volume.nan, "the value of voxels that are not a number; they are refused without");
+    visit("volume.component", volume.component,
+          "which of several numbers a voxel, or of several times, counted from 0");
+    visit("volume.series", volume.series,
+          "DICOM: which of the folder's series, counted from 1; 0: its only one");
+    visit("volume.space", volume.space,
+          "file: world axes as the file states them; lps: a NRRD's turned to LPS");
     auto& tf = scene.transfer_function;
     visit("transfer_function.points", tf.points, "list of [value, r, g, b, alpha], values ascending");
     visit("transfer_function.color", tf.color, "list of [value, r, g, b]; with opacity, instead of points");

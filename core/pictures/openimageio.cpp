@@ -152,11 +152,45 @@ Image read(const std::string& path, Attributes* attributes) {
     return image;
 }
 
+constexpr std::pair<OIIO::TypeDesc::BASETYPE, Page::Type> kPageTypes[] = {
+    {OIIO::TypeDesc::UINT8, Page::Type::u8},   {OIIO::TypeDesc::INT8, Page::Type::i8},
+    {OIIO::TypeDesc::UINT16, Page::Type::u16}, {OIIO::TypeDesc::INT16, Page::Type::i16},
+    {OIIO::TypeDesc::UINT32, Page::Type::u32}, {OIIO::TypeDesc::INT32, Page::Type::i32},
+    {OIIO::TypeDesc::FLOAT, Page::Type::f32},  {OIIO::TypeDesc::DOUBLE, Page::Type::f64},
+};
+
+int count_pages(const std::string& path) {
+    constexpr int kMost = 65536;
+    const auto input = open(path);
+    int pages = 1;
+    while (pages < kMost && input->seek_subimage(pages, 0)) ++pages;
+    (void)input->geterror();  // that there is no other
+    return pages;
+}
+
+Page read_page(const std::string& path, int page) {
+    const auto input = open(path);
+    if (!input->seek_subimage(page, 0))
+        throw InputError(fmt::format("{}: cannot read page {}: {}", path, page, one_line(input->geterror())));
+    const OIIO::ImageSpec spec = input->spec();
+    check_spec(spec, path);
+    const auto* type = std::find_if(std::begin(kPageTypes), std::end(kPageTypes),
+                                    [&](const auto& known) { return known.first == spec.format.basetype; });
+    if (type == std::end(kPageTypes) || !spec.channelformats.empty())
+        throw InputError(fmt::format("{}: its pixels are {}, but integers and floats of one type are allowed",
+                                     path, spec.format.c_str()));
+    Page read{spec.width, spec.height, spec.nchannels, type->second, {}};
+    read.bytes.resize(spec.image_bytes());
+    if (!input->read_image(page, 0, 0, spec.nchannels, spec.format, read.bytes.data()))
+        throw InputError(fmt::format("{}: cannot read: {}", path, one_line(input->geterror())));
+    return read;
+}
+
 }  // namespace
 }  // namespace squint::pictures
 
 extern "C" __attribute__((visibility("default"))) const squint::pictures::Codec* squint_picture_codec() {
     using namespace squint::pictures;
-    static const Codec codec{OIIO::openimageio_version(), encode, read};
+    static const Codec codec{OIIO::openimageio_version(), encode, read, count_pages, read_page};
     return &codec;
 }

@@ -24,11 +24,22 @@ struct Packed {
     std::vector<std::pair<std::string, int>> settings;  // of its encoder
 };
 
+/// One picture of a file as it is stored there.
+struct Page {
+    enum class Type { u8, i8, u16, i16, u32, i32, f32, f64 };
+    int width = 0, height = 0, channels = 0;
+    Type type = Type::u8;
+    std::vector<unsigned char> bytes;  // [row, column, channel], in this machine's order
+};
+
 /// What the module offers.  Its functions throw InputError, beginning with `path`.
 struct Codec {
     int version;                                                            // of OpenImageIO: 20407 is 2.4.7
     std::string (*encode)(const Packed& picture, const std::string& path);  // -> the file's bytes
     Image (*read)(const std::string& path, Attributes* attributes);
+    int (*count_pages)(const std::string& path);
+    Page (*read_page)(const std::string& path,
+                      int page);  // counted from 0; codes, neither scaled nor decoded
 };
 
 /// The module, loaded by the first call: from beside the program in the build tree, from the library folder of an

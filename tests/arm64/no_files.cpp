@@ -30,8 +30,5 @@ bool is_nrrd(const MappedFile&) {
 StoredVolume read_nrrd(const std::string&, const MappedFile&, const LoadLimits&, std::vector<std::string>&) {
     throw InputError("this build reads no files");
 }
-void take_mapped(StoredVolume&, const MappedFile&, std::size_t, const std::string&) {
-    throw InputError("this build reads no files");
-}
 
 }  // namespace squint

@@ -72,7 +72,9 @@ TEST_F(Raw, RefusesSettingsThatCannotBe) {
     s.dims = {std::int64_t{1} << 62, std::int64_t{1} << 62, std::int64_t{1} << 62};
     EXPECT_THAT(refusal(s), HasSubstr("but less than 2^62 bytes of voxels are allowed"));
     s = source(k24Bytes, "u12");
-    EXPECT_EQ(refusal(s), "a.raw: type is \"u12\", but a raw file needs u8, i16, u16 or f32");
+    EXPECT_EQ(
+        refusal(s),
+        "a.raw: type is \"u12\", but a raw file needs one of u8, i8, u16, i16, u32, i32, u64, i64, f32, f64");
     s = source(k24Bytes);
     s.endian = "middle";
     EXPECT_EQ(refusal(s), "a.raw: endian is \"middle\", but little and big are allowed");
