@@ -16,7 +16,11 @@ CompositingForm form_of(const Scene& scene) {
 CompositingStage build_compositing(const StageInputs& in) {
     CompositingStage s;
     s.form = form_of(in.scene);
-    if (!s.is_unit255()) require_integer_bits(in, Wire::transparency, 1, "a transparency of 1.0");
+    if (s.is_unit255())
+        require_fraction_bits(in, Wire::transparency, 1,
+                              "a transparency of 1.0, which is 2^F - 1 in this form,");
+    else
+        require_integer_bits(in, Wire::transparency, 1, "a transparency of 1.0");
     s.premultiplied = in.premultiplied;
     s.alpha_fraction = fraction(in, Wire::slab_alpha);
     const int unlit = s.premultiplied ? fraction(in, Wire::slab_color) : fraction(in, Wire::slab_ratio);

@@ -38,6 +38,8 @@ int bits_for(double value);
 
 /// Throws InputError, naming the wire, where its format has fewer than `bits` integer bits, which `what` needs.
 void require_integer_bits(const StageInputs& in, Wire wire, int bits, const std::string& what);
+/// The same for fraction bits.
+void require_fraction_bits(const StageInputs& in, Wire wire, int bits, const std::string& what);
 /// Throws InputError, naming the wire, where its format is unsigned.
 void require_signed(const StageInputs& in, Wire wire);
 

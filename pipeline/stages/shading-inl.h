@@ -10,6 +10,8 @@
 
 #include "pipeline/stages/location-inl.h"
 
+#include "core/portable_math.h"
+
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
@@ -40,6 +42,15 @@ HWY_INLINE W power(const ShadingStage& s, W x) {
     return quantise(
         blend(gather(s.power_table, row, 0), gather(s.power_table, row + constant<W>(1), 0), rest, fraction),
         s.to_power_lerp);
+}
+
+/// Without rounding a table is the power itself.
+inline Real<double> power(const ShadingStage& s, Real<double> x) {
+    if (s.power != PowerRule::table || s.power_table.active) return power<Real<double>>(s, x);
+    const double one = power_of_two<double>(s.power_fraction);
+    Rescale to = s.to_power_lerp;
+    to.shift = 0;
+    return quantise(Real<double>{portable::pow(quantise(x, s.to_power_input).v / one, s.exponent) * one}, to);
 }
 
 /// Lights a slab: `color`, straight or premultiplied, comes back lit.  A zero normal gets ambient light only.

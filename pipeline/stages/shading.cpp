@@ -44,6 +44,7 @@ ShadingStage build_shading(const StageInputs& in) {
     s.material = {settings.ka, settings.kd, settings.ks};
     s.ka = quantise_real(settings.ka, material), s.kd = quantise_real(settings.kd, material),
     s.ks = quantise_real(settings.ks, material);
+    s.exponent = settings.exponent;
     s.squarings = static_cast<int>(std::bit_width(static_cast<std::uint64_t>(settings.exponent))) - 1;
     if (settings.power == PowerRule::squaring && settings.exponent != std::ldexp(1.0, s.squarings))
         throw InputError(

@@ -32,6 +32,7 @@ struct ShadingStage {
     std::array<double, 3> material{};                    // the same, exact
     std::array<std::array<double, 3>, kMostLights> light_exact{}, half_exact{}, color_exact{};
     bool active = true;  // Real: constants rounded or exact
+    double exponent = 1;
     int squarings = 0;
     std::int64_t parabola_slope = 0;  // 2 (exponent + 1) / 2: keeps the lobe's energy; one fraction bit
     Table power_table;                // power rule `table`: 2^b + 1 rows over the dot's range

@@ -201,6 +201,8 @@ Case draw_case(unsigned seed, const std::string& preset) {
     scene.classification = {};
     ClassificationSettings& method = scene.classification;
     method.method = draw.one_of({Method::pc, Method::pc_mid, draw.any_of<Method>(), draw.any_of<Method>()});
+    if (scene.sampling.interpolation == InterpolationRule::nearest && method.method != Method::pc_mid)
+        method.method = Method::pc;  // slab methods are refused there
     method.order = static_cast<int>(method.method == Method::leg ? draw.between(2, 4) : draw.between(1, 5));
     method.table_size = 64;
     method.lookup = draw.any_of<TableLookup>();
