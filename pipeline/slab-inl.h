@@ -61,7 +61,7 @@ struct FromVolume {
     }
 };
 
-/// MIP, MinIP, average: one scalar of what a ray has met so far and its next sample.
+/// MIP, MinIP, average: of a slab's two ends, or of what a ray has met so far and more of it.
 template <class W>
 HWY_INLINE W merge_samples(CompositingMode mode, W kept, W next) {
     return mode == CompositingMode::mip     ? max(kept, next)
@@ -69,14 +69,23 @@ HWY_INLINE W merge_samples(CompositingMode mode, W kept, W next) {
                                             : kept + next;
 }
 
-/// The end of a projection: the extreme or the sum of a ray's `slabs` samples is classified and composited as
-/// one.
+/// The trapezoid's mean along a ray, rounded once: every slab counts the mean of its ends, by its length.
+template <class W>
+HWY_INLINE W average_of(const Plan& plan, const ProjectedRay<W>& ray) {
+    const W full = constant<W>(std::int64_t{1} << plan.location.length_fraction);
+    const W last = divisor<W>(ray.last_length);
+    const W length = (ray.slabs - constant<W>(1)) * full + last;
+    return within(quotient(ray.kept * full + ray.last_ends * last, shift_left(length, 1), plan.to_average), 0,
+                  plan.input.highest);
+}
+
+/// The end of a projection: what stands for a ray is classified and composited as one slab.
 template <class W, class M, class Observer>
-Accumulated<W> projected(const Plan& plan, const M& method, W scalar, W slabs, Accumulated<W> pixel,
+Accumulated<W> projected(const Plan& plan, const M& method, const ProjectedRay<W>& ray, Accumulated<W> pixel,
                          Observer& observer) {
     observer.at(Part::classification);
-    if (plan.scene.compositing.mode == CompositingMode::average)
-        scalar = within(quotient(scalar, slabs, plan.to_average), 0, plan.input.highest);
+    const W scalar =
+        plan.scene.compositing.mode == CompositingMode::average ? average_of(plan, ray) : ray.kept;
     const Slab<W> slab =
         classify(method, scalar, scalar, constant<W>(std::int64_t{1} << plan.location.length_fraction));
     observer.at(Part::compositing);
@@ -123,7 +132,7 @@ class Slabs {
     }
 
     /// A projection's end.
-    void project(W scalar, W slabs) { pixel = projected(plan_, method_, scalar, slabs, pixel, observer_); }
+    void project(const ProjectedRay<W>& ray) { pixel = projected(plan_, method_, ray, pixel, observer_); }
 
   private:
     HWY_INLINE void take_samples(W k) {
@@ -241,11 +250,19 @@ void cast_ray(const Plan& plan, const M& method, const Voxels& voxels, const Ray
     pixel.samples = 0;
     if (plan.projection_mode) {
         if (count > 0) {
-            W scalar = slabs.sample(constant<W>(0)).input;
-            for (std::int64_t k = 1; k < count; ++k)
-                scalar =
-                    merge_samples(plan.scene.compositing.mode, scalar, slabs.sample(constant<W>(k)).input);
-            slabs.project(scalar, constant<W>(count));
+            const CompositingMode mode = plan.scene.compositing.mode;
+            const bool average = mode == CompositingMode::average;
+            W front = slabs.sample(constant<W>(0)).input;
+            ProjectedRay<W> all{average ? constant<W>(0) : front, constant<W>(0), constant<W>(count),
+                                ray.last_length};
+            for (std::int64_t k = 0; k < count; ++k) {
+                const W back = slabs.sample(constant<W>(k + 1)).input;
+                const W ends = merge_samples(mode, front, back);
+                W& to = average && k == count - 1 ? all.last_ends : all.kept;
+                to = merge_samples(mode, to, ends);
+                front = back;
+            }
+            slabs.project(all);
         }
         pixel.samples = count;
     } else {

@@ -31,6 +31,15 @@ struct Sample {
     W input;   // in table entries
 };
 
+/// MIP, MinIP, average: what stands for a ray of `slabs` slabs, one at least.
+template <class W>
+struct ProjectedRay {
+    W kept;       // MIP, MinIP: the extreme of all samples; average: the sum of both ends of every full slab
+    W last_ends;  // average: the sum of the last slab's ends
+    W slabs;
+    W last_length;  // of the last slab, in steps
+};
+
 /// What one ray leaves behind.
 template <class W>
 struct Pixel {

@@ -57,7 +57,7 @@ double drift_of(const Plan& plan) {
 
 // Blocks that a slab's two ends may lie apart; 0 where one sample classifies it.
 int slab_reach(const Plan& plan) {
-    if (!plan.needs_back) return 0;
+    if (!plan.samples_both_ends()) return 0;
     return static_cast<int>(std::ceil(std::min((plan.scene.sampling.step + drift_of(plan)) / kBlock, 1e6)));
 }
 

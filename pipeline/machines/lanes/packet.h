@@ -104,8 +104,9 @@ struct alignas(64) PixelPacket {
 
 /// What stands for sixteen rays in MIP, MinIP and average, so far.
 struct alignas(64) ProjectionPacket {
-    Row extreme;              // the largest or smallest input
-    std::int64_t sum[kRays];  // of inputs
+    Row extreme;                    // the largest or smallest input
+    std::int64_t sum[kRays];        // of both ends' inputs of every full slab
+    std::int64_t last_ends[kRays];  // of the last slab's
 };
 
 }  // namespace squint::lanes

@@ -95,11 +95,10 @@ class PacketLoop {
     /// Ray r's pixel.
     Pixel<std::int64_t> pixel(int r) const {
         if (plan_.projection_mode && w_.rays.slabs.v[r] > 0)
-            return project_pixel(plan_,
-                                 plan_.scene.compositing.mode == CompositingMode::average
-                                     ? w_.projection.sum[r]
-                                     : w_.projection.extreme.v[r],
-                                 w_.rays.slabs.v[r]);
+            return project_pixel(
+                plan_, {plan_.scene.compositing.mode == CompositingMode::average ? w_.projection.sum[r]
+                                                                                 : w_.projection.extreme.v[r],
+                        w_.projection.last_ends[r], w_.rays.slabs.v[r], w_.rays.last_length.v[r]});
         return finished<std::int64_t>(w_.pixels, r, notes_ ? w_.notes.pixel[r] : Pixel<std::int64_t>{});
     }
 
@@ -121,7 +120,7 @@ class PacketLoop {
             // Inputs are not negative.
             w_.projection.extreme.v[r] =
                 plan_.scene.compositing.mode == CompositingMode::minip ? std::numeric_limits<Word>::max() : 0;
-            w_.projection.sum[r] = 0;
+            w_.projection.sum[r] = w_.projection.last_ends[r] = 0;
         }
     }
     template <class W>
@@ -143,7 +142,7 @@ class PacketLoop {
             batch(rows, next, carried);
             if (!any_active(w_.pixels)) return;
             kernels_.pass_over(w_.rays, rows.end(), next.first, w_.pixels);
-            carried = plan_.needs_back && next.first == rows.end();
+            carried = plan_.samples_both_ends() && next.first == rows.end();
             rows = next;
         }
     }
@@ -165,7 +164,7 @@ class PacketLoop {
 
     // A batch's slabs through all stages.  `next`: the batch behind it, no rows where that is not known.
     void batch(const Rows& rows, const Rows& next, bool carried) {
-        const int back = plan_.needs_back ? 1 : 0;
+        const int back = plan_.samples_both_ends() ? 1 : 0;
         const int from = carried ? 1 : 0, to = rows.count + back;
         if (located_ == rows.first) {
             current_ = 1 - current_;
@@ -201,7 +200,7 @@ class PacketLoop {
     void look_ahead(const Rows& next, int from) {
         located_ = -1;
         if (next.count == 0) return;
-        locate(w_.samples[1 - current_], next.first, from, next.count + (plan_.needs_back ? 1 : 0));
+        locate(w_.samples[1 - current_], next.first, from, next.count + (plan_.samples_both_ends() ? 1 : 0));
         located_ = next.first;
     }
 
