@@ -42,6 +42,18 @@ using Corners = std::array<double, 8>;
 /// The trilinear interpolant of `corners` along a passage.
 Cubic along(const Corners& corners, const Passage& passage);
 
+/// A part of a passage nearest to one voxel.
+struct NearestPart {
+    Passage passage;
+    double scalar = 0;
+};
+/// A passage cut where the nearest voxel changes: half-way between voxels, where the upper one begins.
+struct NearestParts {
+    int count = 0;
+    std::array<NearestPart, 4> part{};
+};
+NearestParts nearest_along(const Corners& corners, const Passage& passage);
+
 /// Scalars at the corners of a cell; an axis of one voxel repeats it.
 Corners corners_of(const Volume& volume, const Index3& cell);
 
