@@ -15,7 +15,7 @@ constexpr Spec s(int i, int f, Rounding rounding) {
     return {{i, f, true}, rounding, Overflow::sat};
 }
 int clip(int bits) {
-    return std::clamp(bits, 0, kMostFractionBits);
+    return std::clamp(bits, 0, kMostChosenFractionBits);
 }
 // Fraction bits of a highlight above those that do for exponents up to 64: (N.H)^p errs by p times as much.
 int highlight_bits(const PresetInputs& in) {
@@ -110,7 +110,7 @@ WireSpecs standard(const PresetInputs& in) {
 // ray).
 WireSpecs wide(const PresetInputs& in) {
     constexpr Rounding r = Rounding::rnd_conv;
-    const int f = std::clamp(9 + in.ray_bits + 2, 20, kMostFractionBits);
+    const int f = std::clamp(9 + in.ray_bits + 2, 20, kMostChosenFractionBits);
     WireSpecs w = standard(in);
     w[Wire::location] = u(in.location_bits, 24, r), w[Wire::direction] = s(in.direction_bits, 24, r),
     w[Wire::weight] = u(1, 20, r);
@@ -143,7 +143,7 @@ const std::vector<std::string>& preset_names() {
 int accumulating_bits(const PresetInputs& in) {
     constexpr int kOfThirtyTwoBits = 15;  // two factors of u1.15 and a sign
     if (in.step >= 0.5 && in.ray_bits <= 12 && !in.faint) return kOfThirtyTwoBits;
-    return std::clamp(9 + in.ray_bits, kOfThirtyTwoBits, kMostFractionBits);
+    return std::clamp(9 + in.ray_bits, kOfThirtyTwoBits, kMostChosenFractionBits);
 }
 
 bool rounds_nothing(std::string_view preset) {

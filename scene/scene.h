@@ -26,7 +26,16 @@ enum class TableLookup { bilinear, nearest };
 enum class AlphaEncoding { alpha, sqrt_alpha };  // how the table stores opacity, in the format of table_alpha
 enum class ShadingModel { none, phong, blinn_phong };
 enum class PowerRule { squaring, parabola, table };
-enum class CompositingForm { automatic, w, equation_9, alpha, back_to_front, unit255_shift, unit255_blinn };
+enum class CompositingForm {
+    automatic,
+    w,
+    w_carry,
+    equation_9,
+    alpha,
+    back_to_front,
+    unit255_shift,
+    unit255_blinn
+};
 enum class CompositingMode { over, mip, minip, average };
 enum class LayoutRule { automatic, linear, cells };
 
@@ -47,7 +56,7 @@ SQUINT_NAMES(TableLookup, "bilinear", "nearest");
 SQUINT_NAMES(AlphaEncoding, "alpha", "sqrt_alpha");
 SQUINT_NAMES(ShadingModel, "none", "phong", "blinn_phong");
 SQUINT_NAMES(PowerRule, "squaring", "parabola", "table");
-SQUINT_NAMES(CompositingForm, "auto", "w", "equation_9", "alpha", "back_to_front", "unit255_shift",
+SQUINT_NAMES(CompositingForm, "auto", "w", "w_carry", "equation_9", "alpha", "back_to_front", "unit255_shift",
              "unit255_blinn");
 SQUINT_NAMES(CompositingMode, "over", "mip", "minip", "average");
 SQUINT_NAMES(LayoutRule, "auto", "linear", "cells");
@@ -250,9 +259,8 @@ void visit_scene(S& scene, V&& visit) {
           "find opaque values inside a slab");
     visit("compositing.mode", scene.compositing.mode, "over, mip, minip or average");
     visit("compositing.form", scene.compositing.form,
-          "w, equation_9, alpha, back_to_front, unit255_shift or unit255_blinn; auto: w, but equation_9 for "
-          "the preset "
-          "squeeze and unit255_shift for eight_bit");
+          "w, w_carry (remainders carried on), equation_9, alpha, back_to_front, unit255_shift or "
+          "unit255_blinn; auto: w, but equation_9 for the preset squeeze and unit255_shift for eight_bit");
     visit("output.depth", scene.output.depth, "channels Z and Z.mean");
     visit("output.normals", scene.output.normals, "channels N.x N.y N.z");
     visit("output.samples", scene.output.samples, "channel samples");

@@ -72,7 +72,7 @@ OpacityUnit computed_opacity_unit(const WireSpecs& specs) {
     const double deepest =
         std::min(std::ldexp(1.0, depth.format.integer_bits), 0.6932 * (alpha.format.fraction_bits + 2));
     const int rows = static_cast<int>(std::ceil(std::ldexp(deepest, unit.row_bits))) + 2;
-    const int fraction = std::min(alpha.format.fraction_bits + 2, kMostFractionBits);
+    const int fraction = std::min(alpha.format.fraction_bits + 2, kMostChosenFractionBits);
     const Spec row_spec{{1, fraction, false}, Rounding::rnd_conv, Overflow::sat};
     unit.rows = Table(rows, 1);
     unit.rows.wire = static_cast<int>(Wire::slab_alpha);
@@ -193,7 +193,7 @@ EntryLookup build_entry_lookup(const ClassificationInputs& in) {
                         "opacity needs 1 or more",
                         to_string(alpha.format)));
     Spec stored = alpha;
-    if (rooted) stored.format = {1, std::min(2 * alpha.format.fraction_bits, kMostFractionBits), false};
+    if (rooted) stored.format = {1, std::min(2 * alpha.format.fraction_bits, kMostChosenFractionBits), false};
     const auto size = static_cast<std::size_t>(n), row_count = static_cast<std::size_t>(rows);
     const std::unique_ptr<double[]> numbers =
         std::make_unique_for_overwrite<double[]>(5 * row_count + 2 * size);

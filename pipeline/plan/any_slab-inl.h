@@ -80,6 +80,9 @@ void any_slab(const Plan& plan, Observer& observer, int neighbours = 1) {
         [&](const auto& method) {
             Slabs slabs(plan, method, voxels, ray, up_to(most_slabs), observer);
             slabs.pixel.transparency = up_to(plan.compositing.unit(), width_of(Wire::transparency));
+            const int carried = std::max(plan.compositing.to_contribution.shift, 0);
+            if (plan.compositing.form == CompositingForm::w_carry)
+                slabs.pixel.remainder = up_to((std::int64_t{1} << carried) - 1, carried);
             for (W& c : slabs.pixel.color) c = any_of(plan.specs[Wire::color].format);
             if (!plan.projection_mode) {
                 for (int i = 0; i < neighbours; ++i) slabs.step(up_to(most_slabs - 1));

@@ -204,6 +204,7 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
     plan.real = rounds_nothing(precision.preset);
     plan.wants_depth = scene.output.depth;
     preset_specs(precision.preset, preset_inputs(plan), plan.specs);
+    keep_sums_exact(scene, plan.specs);
     if (!plan.real) apply_overrides(precision, plan.specs);  // `real` has no formats to be given others
     report_stages(plan);
     StageInputs in{.scene = plan.scene,

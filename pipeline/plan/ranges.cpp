@@ -60,9 +60,9 @@ void leave_out_proven_limits(Plan& plan, const Slab<Range>& slab) {
                            std::all_of(slab.color.begin(), slab.color.end(),
                                        [&](const Range& c) { return within_unit(c, s.color_fraction); });
     s.of_units = unit_slab;
-    if (s.form == CompositingForm::w && !s.premultiplied && unit_slab &&
+    if (s.takes_from_transparency() && !s.premultiplied && unit_slab &&
         s.contribution_fraction == s.transparency_fraction && color.integer_bits >= 1 &&
-        color.fraction_bits == s.contribution_fraction)
+        color.fraction_bits >= s.contribution_fraction)
         s.to_color.limits = s.to_color_sum.limits = s.to_transparency.limits = false;
 }
 

@@ -98,8 +98,9 @@ constexpr bool is_outer_row(int y, int z) {
 /// Sixteen pixels on their way.
 struct alignas(64) PixelPacket {
     Row color[3], transparency;
-    Row active;   // 1 while a ray goes on
-    Row samples;  // slabs composited
+    Row remainder;  // w_carry
+    Row active;     // 1 while a ray goes on
+    Row samples;    // slabs composited
 };
 
 /// What stands for sixteen rays in MIP, MinIP and average, so far.

@@ -128,6 +128,7 @@ class PacketLoop {
         for (int r = 0; r < kRays; ++r) {
             for (std::size_t c = 0; c < 3; ++c) w_.pixels.color[c].v[r] = bits_of(none.color[c]);
             w_.pixels.transparency.v[r] = bits_of(none.transparency);
+            w_.pixels.remainder.v[r] = bits_of(none.remainder);
             w_.pixels.active.v[r] = w_.rays.slabs.v[r] > 0;
             w_.pixels.samples.v[r] = 0;
         }
