@@ -60,7 +60,8 @@ std::string allowed_text(std::string_view key) {
             return listed(words) + (key == "precision.preset" ? ", or the path of a preset file" : "");
         if (key == "volume.file" || key == "transfer_function.file") return "a path in quotes";
         if (key.starts_with("precision."))
-            return "a format (I of 0 to 24, F of 0 to 29, not both 0), a rounding (trn, trn_zero, rnd, rnd_conv) and "
+            return "a format (I of 0 to 24, F of 0 to 29, not both 0), a rounding (trn, trn_zero, rnd, "
+                   "rnd_conv) and "
                    "an overflow rule (sat, wrap), as "
                    "in \"u1.15 trn sat\"; "
                    "parts may be left out";
