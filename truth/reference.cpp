@@ -336,7 +336,7 @@ std::array<double, 4> Reference::pixel(int column, int row) const {
         const Vec3 color = matter_.color_at(at) * alpha;
         return {color.x, color.y, color.z, alpha};
     }
-    const RayLight light(plan_.scene, plan_.camera, ray.direction);
+    const RayLight light(plan_.scene, *plan_.volume, plan_.camera, ray.direction);
     RayIntegral integral(plan_, matter_, plan_.lit ? &light : nullptr, tolerance_ / 2 / chord);
     for (Passage passage; walk.next(passage);)
         if (!integral.add(passage, corners_of(*plan_.volume, passage.cell))) break;

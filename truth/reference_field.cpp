@@ -110,8 +110,11 @@ Corners corners_of(const Volume& volume, const Index3& cell) {
 }
 
 std::array<Cubic, 3> gradient_along(const Volume& volume, GradientRule rule, const Passage& passage) {
+    // Differences are once, twice or 32 times the gradient.
+    const double differences = rule == GradientRule::analytic ? 1 : rule == GradientRule::sobel ? 32 : 2;
     std::array<Cubic, 3> gradient;
     for (int axis = 0; axis < 3; ++axis) {
+        const double per_spacing = volume.smallest_spacing() / (volume.spacing[axis] * differences);
         Corners difference;
         for (int i = 0; i < 8; ++i) {
             Index3 p = passage.cell + Index3(i & 1, i >> 1 & 1, i >> 2);
@@ -125,7 +128,7 @@ std::array<Cubic, 3> gradient_along(const Volume& volume, GradientRule rule, con
                 here = rule == GradientRule::sobel ? sobel_difference(volume, p, axis)
                                                    : central_difference(volume, p, axis);
             }
-            here /= volume.spacing[axis];
+            here *= per_spacing;
         }
         gradient[static_cast<std::size_t>(axis)] = along(difference, passage);
     }

@@ -57,9 +57,9 @@ NearestParts nearest_along(const Corners& corners, const Passage& passage);
 /// Scalars at the corners of a cell; an axis of one voxel repeats it.
 Corners corners_of(const Volume& volume, const Index3& cell);
 
-/// The gradient along a passage, up to one common factor, in world space.  The rules of docs/conventions.md, all
-/// trilinear in the cell: differences of samples one voxel apart, clamped to the box, are the interpolated
-/// differences of the voxels.
+/// The gradient along a passage, in levels per smallest voxel spacing, in world space.  The rules of
+/// docs/conventions.md, all trilinear in the cell: differences of samples one voxel apart, clamped to the box, are
+/// the interpolated differences of the voxels.
 std::array<Cubic, 3> gradient_along(const Volume& volume, GradientRule rule, const Passage& passage);
 
 /// Blocks of 4 x 4 x 4 cells and whether a ray has to look into them.

@@ -19,8 +19,11 @@ Power::Power(const ShadingSettings& settings)
     for (; !parabola_ && exponent_ > 1 && std::fmod(exponent_, 2) == 0; exponent_ /= 2) ++squarings_;
 }
 
-RayLight::RayLight(const Scene& scene, const Camera& camera, const Vec3& ray_direction)
-    : settings_(&scene.shading), power_(scene.shading), eye_(-ray_direction) {
+RayLight::RayLight(const Scene& scene, const Volume& volume, const Camera& camera, const Vec3& ray_direction)
+    : settings_(&scene.shading),
+      power_(scene.shading),
+      shortest_(0x1p-40 * static_cast<double>(volume.largest - volume.smallest)),
+      eye_(-ray_direction) {
     for (const Light& light : scene.lights) {
         const Vec3 towards = light.headlight ? -camera.view : light.direction.normalized();
         white_ = white_ && light.color == Vec3(1);
@@ -32,7 +35,7 @@ Reflection RayLight::operator()(const Vec3& gradient) const {
     const ShadingSettings& s = *settings_;
     Vec3 diffuse{0, 0, 0}, specular{0, 0, 0};
     const double length = std::sqrt(gradient.dot(gradient));
-    if (length > 0) {
+    if (length > shortest_) {
         const Vec3 normal = gradient * (-1 / length);
         for (std::size_t l = 0; l < lamps_; ++l) {
             const Lamp& lamp = lamp_[l];

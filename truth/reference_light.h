@@ -3,6 +3,7 @@
 
 #include "core/camera.h"
 #include "core/portable_math.h"
+#include "core/volume.h"
 #include "scene/scene.h"
 
 #include <algorithm>
@@ -34,8 +35,9 @@ class Power {
 /// The lights as one ray meets them.
 class RayLight {
   public:
-    RayLight(const Scene& scene, const Camera& camera, const Vec3& ray_direction);
-    /// `gradient` in world space, of any length.  A zero gradient gets ambient light only.
+    RayLight(const Scene& scene, const Volume& volume, const Camera& camera, const Vec3& ray_direction);
+    /// `gradient` in world space, in levels per smallest voxel spacing.  A zero gradient gets ambient light
+    /// only, and one below 2^-40 of the data's range is zero: a rounding has a direction, too.
     Reflection operator()(const Vec3& gradient) const;
 
   private:
@@ -44,7 +46,8 @@ class RayLight {
     };
     const ShadingSettings* settings_;
     Power power_;
-    Vec3 eye_;  // towards it
+    double shortest_;  // of a gradient
+    Vec3 eye_;         // towards it
     std::array<Lamp, kMostLights> lamp_;
     std::size_t lamps_ = 0;
     bool white_ = true;  // every lamp is

@@ -121,15 +121,16 @@ HWY_INLINE std::array<W, 3> normalise(const GradientStage& s, const std::array<W
     return normal;
 }
 
-/// Without rounding the definition itself will do.
+/// Without rounding the definition itself will do, but for what is too short to be more than a rounding.
 template <RealWord W>
 HWY_INLINE std::array<W, 3> normalise(const GradientStage& s, const std::array<W, 3>& g) {
-    const W zero = constant<W>(0), length = square_root(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+    const W zero = constant<W>(0), shortest = W::from(s.vanishing);
+    const W length = square_root(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
     Rescale raw = s.to_normal;
     raw.shift = 0;
     const W scale = W::from(-power_of_two<double>(s.normal_fraction)) / length;
     const auto component = [&](std::size_t a) SQUINT_WRITTEN_OUT {
-        return select(zero < length, quantise(g[a] * scale, raw), zero);
+        return select(shortest < length, quantise(g[a] * scale, raw), zero);
     };
     return {component(0), component(1), component(2)};
 }

@@ -33,6 +33,8 @@ GradientStage build_gradient(const StageInputs& in) {
     s.normal_fraction = fraction(in, Wire::normal);
     s.to_normal = Rescale(-kNormalGuard, in.specs[Wire::normal], wire_index(Wire::normal));
     s.to_normal.divides = true;
+    s.vanishing = kVanishing * static_cast<double>(v.largest - v.smallest) *
+                  static_cast<double>(in.specs[Wire::gradient].format.one());
     return s;
 }
 

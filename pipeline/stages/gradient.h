@@ -27,6 +27,9 @@ struct GradientStage {
     bool active = true;
     Rescale to_normal;  // quotient of a component and the length
     int normal_fraction = 0;
+    // Real: below this, in raw units, a gradient is zero.  A rounding alone can leave it 1e-13 long, and
+    // normalised that is a full normal where the field is flat.
+    double vanishing = 0;
 
     template <class V>
     void visit(V&& v) {
@@ -38,6 +41,9 @@ GradientStage build_gradient(const StageInputs& in);
 
 /// Bits that normalising keeps of the largest component, and fraction bits it gives the length.
 inline constexpr int kNormalBits = 15, kNormalGuard = 8;
+
+/// A gradient below this part of the data's range, in levels per smallest voxel spacing, is zero in doubles.
+inline constexpr double kVanishing = 0x1p-40;
 
 /// The 4x4x4 voxels about a cell, the cell's corners in the middle; x fastest.  Clamped at the volume's
 /// faces.

@@ -5,6 +5,7 @@
 #include "core/procedural.h"
 #include "pipeline/render.h"
 #include "tests/truth/reference_cases.h"
+#include "truth/reference_light.h"
 
 #include <gtest/gtest.h>
 
@@ -352,6 +353,20 @@ TEST(Reference, AFlatFieldGetsAmbientLightOnly) {
         look(scene, *volume, Vec3(0.1, 1, 0.2));
         const auto pixel = reference_pixel(make_plan(scene, volume), 0, 0);
         EXPECT_NEAR(pixel[0], 0.25 * pixel[3], kPromise);
+    }
+}
+
+TEST(Reference, AGradientOfARoundingIsNone) {
+    const auto volume = slope(Vec3(1));  // scalars 100 to 730
+    Scene scene = plain_scene();
+    scene.lights = {{.direction = Vec3(0, 0, 1)}};
+    scene.shading = {.ka = 0.25, .kd = 0.5, .ks = 0.125};
+    const Plan plan = make_plan(scene, volume);
+    const reference::RayLight light(scene, *volume, plan.camera, Vec3(0, 0, -1));
+    EXPECT_EQ(light(Vec3(0, 0, -630 * 0x1.01p-40)).diffuse.x, 0.75);
+    for (const double length : {0.0, 1e-13, 630 * 0x0.ffp-40}) {
+        EXPECT_EQ(light(Vec3(0, 0, -length)).diffuse.x, 0.25);
+        EXPECT_EQ(light(Vec3(0, 0, -length)).specular.x, 0);
     }
 }
 

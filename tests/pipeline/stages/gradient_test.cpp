@@ -305,6 +305,19 @@ TEST(Gradient, SamplesToEitherSideAreHalved) {
     EXPECT_EQ(sample_difference<Word>(s, 0, 4095 << 12), -(Word{4095} << 11));
 }
 
+// 2^-40 of 8 bits' range, in levels: a rounding in doubles leaves 1e-13.
+TEST(Normalise, InDoublesARoundingOfZeroIsZero) {
+    GradientStage s = stage_of(GradientRule::central, 8, 15);
+    s.to_normal.active = false;
+    s.vanishing = kVanishing * 255 * 256;
+    const auto normal_of = [&](double x) {
+        return normalise(s, std::array<Real<double>, 3>{{{x * 256}, {0}, {-0.0}}});
+    };
+    for (const double x : {0.0, 1.1e-13, -2.3e-10}) EXPECT_EQ(normal_of(x)[0].v, 0) << x;
+    EXPECT_EQ(normal_of(2.4e-10)[0].v, -32768);
+    EXPECT_EQ(normal_of(-1e-3)[0].v, 32768);
+}
+
 TEST(Gradient, IntervalsHoldEveryFieldsGradientAndNormal) {
     std::mt19937_64 random(8);
     for (const GradientRule rule : kVoxelRules)
