@@ -163,22 +163,24 @@ class Slabs {
 
     // Stages 3 and 5: what is seen of a slab, lit.
     HWY_INLINE void light(const Sample<W>& front, const Sample<W>& back, Slab<W>& slab) const {
-        const std::array<W, 3> normal = slab_normal(front, back);
+        const std::array<W, 3> gradient = slab_gradient(front, back);
+        observer_.at(Part::normal);
+        const std::array<W, 3> normal = normalise(plan_.gradient, gradient);
+        const W certain = plan_.gradient.fades ? confidence(plan_.gradient, gradient) : constant<W>(0);
         observer_.lit(normal);
         observer_.at(Part::shading);
-        shade(plan_.shading, ray_, normal, slab.alpha, slab.color);
+        shade(plan_.shading, ray_, normal, slab.alpha, slab.color, certain);
     }
 
-    // The normal that lights a slab: of its sample, or of the mean of its two ends' gradients.
-    HWY_INLINE std::array<W, 3> slab_normal(const Sample<W>& front, const Sample<W>& back) const {
+    // The raw gradient that lights a slab: of its sample, or the sum of its two ends'.
+    HWY_INLINE std::array<W, 3> slab_gradient(const Sample<W>& front, const Sample<W>& back) const {
         std::array<W, 3> gradient = gradient_at(front);
         if constexpr (M::kNeedsBack) {
             const std::array<W, 3> other = gradient_at(back);
             observer_.at(Part::gradient);
             for (std::size_t a = 0; a < 3; ++a) gradient[a] = gradient[a] + other[a];
         }
-        observer_.at(Part::normal);
-        return normalise(plan_.gradient, gradient);
+        return gradient;
     }
 
     // Stage 2 at a location.

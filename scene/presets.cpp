@@ -32,7 +32,7 @@ WireSpecs squeeze(const PresetInputs& in) {
     w[Wire::length] = u(1, 15, r);
     w[Wire::lerp_x] = w[Wire::lerp_y] = w[Wire::sample] = u(12, 12, r);
     w[Wire::gradient_lerp] = w[Wire::gradient] = s(12, 12, r), w[Wire::spacing] = u(1, 12, r),
-    w[Wire::normal] = s(1, 12, r);
+    w[Wire::normal] = s(1, 12, r), w[Wire::confidence] = u(1, 15, r);
     w[Wire::classification_input] = u(12, 0, r);
     w[Wire::table_color] = u(1, 15, r), w[Wire::table_alpha] = u(1, 15, r);
     w[Wire::table_extinction] = u(std::max(9, in.total_depth_bits), 15, r);
@@ -55,9 +55,9 @@ WireSpecs eight_bit(const PresetInputs& in) {
     w[Wire::classification_input] = u(in.entry_bits, 0, r);
     w[Wire::gradient_lerp] = w[Wire::gradient] = s(in.scalar_bits, 1, r), w[Wire::normal] = s(1, 7, r);
     w[Wire::table_color] = w[Wire::table_alpha] = u(0, 8, r);
-    for (const Wire wire :
-         {Wire::slab_ratio, Wire::slab_alpha, Wire::slab_color, Wire::contribution, Wire::color,
-          Wire::transparency, Wire::lit_color, Wire::intensity, Wire::material, Wire::power})
+    for (const Wire wire : {Wire::slab_ratio, Wire::slab_alpha, Wire::slab_color, Wire::contribution,
+                            Wire::color, Wire::transparency, Wire::lit_color, Wire::intensity, Wire::material,
+                            Wire::power, Wire::confidence})
         w[wire] = u(1, 8, r);
     w[Wire::light] = w[Wire::dot] = s(1, 8, r), w[Wire::slab_depth] = u(4, 8, r);
     return w;
@@ -87,7 +87,7 @@ WireSpecs standard(const PresetInputs& in) {
     w[Wire::lerp_x] = w[Wire::lerp_y] = u(scalar, level, up),
     w[Wire::sample] = u(scalar, std::min(12, 24 - scalar), up);
     w[Wire::gradient_lerp] = w[Wire::gradient] = s(range, gradient, r), w[Wire::spacing] = u(1, 12, r);
-    w[Wire::normal] = s(1, 15 + sharp, r);
+    w[Wire::normal] = s(1, 15 + sharp, r), w[Wire::confidence] = u(1, 15, r);
     w[Wire::classification_input] = u(in.entry_bits, clip(8 + in.entry_levels_bits), up);
     w[Wire::table_color] = u(1, 15, r), w[Wire::table_alpha] = u(1, sum, r);
     // One entry's depth times an input's 8 fraction bits fits 32, too, where the sums' 15 bits do.
@@ -118,7 +118,7 @@ WireSpecs wide(const PresetInputs& in) {
     w[Wire::lerp_x] = w[Wire::lerp_y] = w[Wire::sample] =
         u(in.scalar_bits, std::min(20, 30 - in.scalar_bits), r);
     w[Wire::gradient_lerp] = w[Wire::gradient] = s(in.scalar_bits, 16, r), w[Wire::spacing] = u(1, 20, r),
-    w[Wire::normal] = s(1, clip(20 + highlight_bits(in)), r);
+    w[Wire::normal] = s(1, clip(20 + highlight_bits(in)), r), w[Wire::confidence] = u(1, 20, r);
     w[Wire::classification_input] =
         u(in.entry_bits, clip(std::min(18 + in.entry_levels_bits, 31 - in.entry_bits)), r);
     w[Wire::table_extinction] = w[Wire::table_moment] = u(in.total_depth_bits, 24, r),

@@ -34,6 +34,7 @@ constexpr Limits kLimits[] = {
     {"shading.kd", 0, 1},
     {"shading.ks", 0, 1},
     {"shading.exponent", 1, 4096},
+    {"shading.gradient_floor", 0, 65536},
     {"classification.order", 1, 5},
     {"classification.table_size", 64, 4096},
     {"lights.color", 0, 1},

@@ -116,6 +116,7 @@ struct ShadingSettings {
     double exponent = 32;
     PowerRule power = PowerRule::squaring;
     bool two_sided = false;
+    double gradient_floor = 0;  // levels per smallest voxel spacing; 0: light does not fade in
 };
 
 struct ClassificationSettings {
@@ -239,13 +240,18 @@ void visit_scene(S& scene, V&& visit) {
     visit("clip.high", scene.clip.high, "opposite corner");
     auto& shading = scene.shading;
     visit("shading.model", shading.model, "none, phong or blinn_phong; absent where there is no light");
-    visit("shading.gradient", shading.gradient, "central, central_samples, analytic or sobel");
+    absent where there is no light ");
+        visit("shading.gradient", shading.gradient, "central, central_samples, analytic or sobel");
     visit("shading.ka", shading.ka, "ambient weight");
     visit("shading.kd", shading.kd, "diffuse weight");
     visit("shading.ks", shading.ks, "specular weight");
     visit("shading.exponent", shading.exponent, "specular exponent; a power of two for squaring");
     visit("shading.power", shading.power, "squaring, parabola or table");
     visit("shading.two_sided", shading.two_sided, "light both sides of a surface");
+    visit("shading.gradient_floor", shading.gradient_floor,
+          "light counts by the length of the gradient over this, at most 1, in levels per smallest voxel "
+          "spacing; 0: always "
+          "in full");
     auto& classification = scene.classification;
     visit("classification.method", classification.method,
           "pc, pc_mid, pi2d, pi2d_no_attenuation, pi1d, pi1d_engel, pips or leg");

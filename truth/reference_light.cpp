@@ -35,6 +35,7 @@ Reflection RayLight::operator()(const Vec3& gradient) const {
     const ShadingSettings& s = *settings_;
     Vec3 diffuse{0, 0, 0}, specular{0, 0, 0};
     const double length = std::sqrt(gradient.dot(gradient));
+    const double certain = s.gradient_floor > 0 ? std::min(1.0, length / s.gradient_floor) : 1;
     if (length > shortest_) {
         const Vec3 normal = gradient * (-1 / length);
         for (std::size_t l = 0; l < lamps_; ++l) {
@@ -52,8 +53,8 @@ Reflection RayLight::operator()(const Vec3& gradient) const {
             specular += lamp.color * power_(unit_clamped(highlight));
         }
     }
-    const auto lit = [&](double sum) { return unit_clamped(s.ka + s.kd * unit_clamped(sum)); };
-    const auto shine = [&](double sum) { return s.ks * unit_clamped(sum); };
+    const auto lit = [&](double sum) { return unit_clamped(s.ka + s.kd * certain * unit_clamped(sum)); };
+    const auto shine = [&](double sum) { return s.ks * certain * unit_clamped(sum); };
     if (white_) return {Vec3(lit(diffuse.x)), Vec3(shine(specular.x))};
     return {Vec3(lit(diffuse.x), lit(diffuse.y), lit(diffuse.z)),
             Vec3(shine(specular.x), shine(specular.y), shine(specular.z))};

@@ -216,11 +216,12 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
                    .lit = plan.lit};
     plan.location = build_location(in);
     plan.interpolation = build_interpolation(in);
-    plan.gradient = build_gradient(in);
     plan.input = build_input(in);
     plan.to_average = rescale(in, fraction(in, Wire::classification_input), Wire::classification_input);
     plan_classification(plan);
     in.premultiplied = std::visit([](const auto& m) { return m.kPremultiplied; }, plan.method);
+    in.needs_back = plan.needs_back;
+    plan.gradient = build_gradient(in);
     plan.shading = build_shading(in);
     report_shading(plan);
     plan.compositing = build_compositing(in);

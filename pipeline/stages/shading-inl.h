@@ -54,9 +54,10 @@ inline Real<double> power(const ShadingStage& s, Real<double> x) {
 }
 
 /// Lights a slab: `color`, straight or premultiplied, comes back lit.  A zero normal gets ambient light only.
+/// `confidence` is read where the stage fades.
 template <class W>
 HWY_INLINE void shade(const ShadingStage& s, const RayWords<W>& ray, const std::array<W, 3>& normal, W alpha,
-                      std::array<W, 3>& color) {
+                      std::array<W, 3>& color, W confidence = constant<W>(0)) {
     const W zero = constant<W>(0), one_dot = constant<W>(std::int64_t{1} << s.dot_fraction);
     const std::size_t channels = s.white ? 1 : 3;
     std::array<W, 3> diffuse{zero, zero, zero}, specular{zero, zero, zero};
@@ -99,10 +100,12 @@ HWY_INLINE void shade(const ShadingStage& s, const RayWords<W>& ray, const std::
     const W kd = stage_constant<W>(s.kd, s.material[1], s.material_fraction, s.active, Wire::material);
     const W ks = stage_constant<W>(s.ks, s.material[2], s.material_fraction, s.active, Wire::material);
     for (std::size_t c = 0; c < channels; ++c) {
-        const W sum = clamp(quantise(diffuse[c], s.to_diffuse_sum), zero, one);
+        W sum = clamp(quantise(diffuse[c], s.to_diffuse_sum), zero, one);
+        if (s.fades) sum = quantise(sum * confidence, s.to_faded);
         diffuse[c] =
             clamp(quantise(shift_left(ka, s.intensity_fraction) + kd * sum, s.to_diffuse), zero, one);
         specular[c] = clamp(quantise(specular[c], s.to_specular_sum), zero, one);
+        if (s.fades) specular[c] = quantise(specular[c] * confidence, s.to_faded);
         specular[c] = clamp(quantise(ks * specular[c], s.to_specular), zero, one);
     }
     const W opacity = s.premultiplied ? alpha : constant<W>(std::int64_t{1} << s.color_fraction);

@@ -67,6 +67,8 @@ ShadingStage build_shading(const StageInputs& in) {
                               in.specs[Wire::power]);
     }
     s.power_table.wire = wire_index(Wire::power);
+    s.fades = in.lit && settings.gradient_floor > 0;
+    s.to_faded = rescale(in, s.intensity_fraction + fraction(in, Wire::confidence), Wire::intensity);
     s.to_light = rescale(in, s.light_fraction, Wire::light);
     s.to_dot = rescale(in, s.normal_fraction + s.light_fraction, Wire::dot);
     s.to_light_view = rescale(in, 2 * s.light_fraction, Wire::dot);

@@ -22,6 +22,7 @@ struct ShadingStage {
     int color_fraction = 0;      // of the slab's colour, and of alpha where premultiplied
     bool white = true;           // every light is white: one sum serves all three colours
     bool two_sided = false;
+    bool fades = false;         // confidence weighs what the lights add to ambient light
     bool half_per_ray = false;  // perspective, or Phong's reflected view: the words come with the ray
     int light_fraction = 0, normal_fraction = 0, dot_fraction = 0, power_fraction = 0, intensity_fraction = 0,
         material_fraction = 0;
@@ -39,7 +40,7 @@ struct ShadingStage {
     int power_table_bits = 0;
     Rescale to_light_view;  // Phong: L.V
     Rescale to_dot, to_reflected, to_power_input, to_power, to_power_lerp, to_fall, to_diffuse_sum,
-        to_specular_sum, to_diffuse, to_specular, to_lit;
+        to_specular_sum, to_faded, to_diffuse, to_specular, to_lit;
     Rescale to_light;  // per-ray half and view vectors on their way to words
     Spec light_spec;
 
@@ -47,7 +48,7 @@ struct ShadingStage {
     void visit(V&& v) {
         for (Rescale* r :
              {&to_light_view, &to_dot, &to_reflected, &to_power_input, &to_power, &to_power_lerp, &to_fall,
-              &to_diffuse_sum, &to_specular_sum, &to_diffuse, &to_specular, &to_lit, &to_light})
+              &to_diffuse_sum, &to_specular_sum, &to_faded, &to_diffuse, &to_specular, &to_lit, &to_light})
             v(*r);
         v(power_table);
     }

@@ -356,6 +356,28 @@ TEST(Reference, AFlatFieldGetsAmbientLightOnly) {
     }
 }
 
+// The gradient of slope() is (20, 15, 80) levels a unit at this spacing, and a unit is two smallest spacings.
+TEST(Reference, LightFadesInUpToTheFloorOfGradients) {
+    const Vec3 spacing(1, 2, 0.5);
+    const auto volume = slope(spacing);
+    const double length = Vec3(20, 15, 80).length() / 2;
+    Scene scene = plain_scene();
+    scene.clip.low = spacing, scene.clip.high = spacing * 6;
+    scene.lights = {{.direction = Vec3(-20, -15, -80)}};
+    scene.shading = {.ka = 0.25, .kd = 0.5, .ks = 0.125, .exponent = 1};
+    for (const GradientRule rule : {GradientRule::central, GradientRule::central_samples,
+                                    GradientRule::analytic, GradientRule::sobel}) {
+        scene.shading.gradient = rule;
+        look(scene, *volume, Vec3(20, 15, 80));  // N, L and H agree
+        for (const double floor : {0.0, length / 2, length * (1 - 1e-12), 2 * length, 8 * length}) {
+            scene.shading.gradient_floor = floor;
+            const auto pixel = reference_pixel(make_plan(scene, volume), 0, 0);
+            const double certain = floor > length ? length / floor : 1;
+            EXPECT_NEAR(pixel[0], pixel[3] * (0.25 + certain * 0.625), kPromise) << floor;
+        }
+    }
+}
+
 TEST(Reference, AGradientOfARoundingIsNone) {
     const auto volume = slope(Vec3(1));  // scalars 100 to 730
     Scene scene = plain_scene();

@@ -193,11 +193,14 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
     if (const auto obstacle = too_wide("classification input", plan.input_needs)) return obstacle;
     if (plan.lit && plan.specs[Wire::normal].overflow == Overflow::wrap)
         return "a normal that wraps round is divided by the model";
+    if (plan.gradient.fades && plan.specs[Wire::confidence].overflow == Overflow::wrap)
+        return "a confidence that wraps round is divided by the model";
     std::vector<Wire> stored{
         Wire::location,     Wire::direction,  Wire::weight,     Wire::length,    Wire::classification_input,
         Wire::slab_ratio,   Wire::slab_color, Wire::slab_alpha, Wire::lit_color, Wire::color,
         Wire::transparency, Wire::light};
     if (plan.lit) stored.push_back(Wire::normal);
+    if (plan.gradient.fades) stored.push_back(Wire::confidence);
     if (plan.gradient_from_samples()) stored.push_back(Wire::sample);
     for (const Wire wire : stored) {
         const Format& f = plan.specs[wire].format;

@@ -87,6 +87,7 @@ struct alignas(64) LitSamples {
     Batch half[kMostHalves][3], view[3];
     Batch gradient[3];  // raw; the sum of a slab's two ends
     Batch normal[3];
+    Batch confidence;  // where light fades in
     Batch color[3], alpha;
 };
 

@@ -131,6 +131,7 @@ void draw_light(Draw& draw, Scene& scene) {
                            ? std::ldexp(1.0, static_cast<int>(draw.between(0, 7)))
                            : draw.real(1, 200);
     shading.two_sided = draw.once_in(3);
+    if (draw.once_in(4)) shading.gradient_floor = draw.one_of({draw.real(0, 4), draw.real(0, 400), 1.0});
 }
 
 /// Any format, rounding and overflow rule for a wire, not far from the one it has: the plan refuses some.
@@ -238,6 +239,7 @@ std::vector<Share> shares() {
         {"depth", [](const Plan& p) { return p.scene.output.depth && !p.projection_mode; }},
         {"normals", [](const Plan& p) { return p.scene.output.normals && p.lit; }},
         {"gradients from samples", [](const Plan& p) { return p.gradient_from_samples(); }},
+        {"light that fades in", [](const Plan& p) { return p.gradient.fades; }},
         {"one voxel thick along x", [](const Plan& p) { return p.volume->dims.x == 1; }},
     };
 }

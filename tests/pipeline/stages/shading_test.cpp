@@ -73,6 +73,7 @@ ShadingStage stage_of(double ka, double kd, double ks, ShadingModel model = Shad
     s.to_diffuse_sum = Rescale(15 + kMaterial, intensity);
     s.to_diffuse = s.to_specular = Rescale(kMaterial + 15, intensity);
     s.to_lit = Rescale(30, unsigned_spec(15));
+    s.to_faded = Rescale(30, intensity);
     return s;
 }
 
@@ -239,6 +240,27 @@ TEST(Shading, ATransparentSlabHasNoHighlight) {
     s.premultiplied = true;
     EXPECT_EQ(lit(s, {0, 0, kOne}, 0, 0), 0);
     EXPECT_EQ(lit(s, {0, 0, kOne}, 100, 400), 175);  // 100 (ka + kd) + 400 ks
+}
+
+TEST(Shading, WhatALightAddsIsWeighedByConfidence) {
+    std::mt19937_64 random(5);
+    ShadingStage s = lit_from_above(0.25, 0.5, 0.25), fading = s;
+    fading.fades = true;
+    for (int i = 0; i < 2000; ++i) {
+        const auto component = [&] { return static_cast<Word>(random() % 65537) - kOne; };
+        const Vector n{component(), component(), component()};
+        const auto faded = [&](Word confidence) {
+            Vector color{25000, 25000, 25000};
+            shade(fading, RayWords<Word>{}, n, kOne, color, confidence);
+            return color[0];
+        };
+        const Word full = lit(s, n, 25000), ambient = 6250;
+        ASSERT_EQ(faded(kOne), full);
+        ASSERT_EQ(faded(0), ambient);
+        // Two of four roundings to a half, each of a weight below one, and the last one's own.
+        ASSERT_NEAR(static_cast<double>(faded(kOne / 4)), ambient + static_cast<double>(full - ambient) / 4,
+                    2.5);
+    }
 }
 
 TEST(Shading, BothSidesOfASurfaceAreLitAlikeWhereTheSceneSaysSo) {
