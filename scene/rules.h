@@ -73,8 +73,10 @@ std::string allowed_text(std::string_view key) {
     } else if constexpr (std::is_integral_v<T>) {
         return "a whole number" + limits;
     } else if constexpr (std::is_same_v<T, Vec3>) {
-        return (key.ends_with("color") || key.ends_with("background") ? "three numbers [r, g, b]"
-                                                                      : "three numbers [x, y, z]") +
+        return (key.ends_with("color") || key.ends_with("background") || key.ends_with("cool") ||
+                        key.ends_with("warm")
+                    ? "three numbers [r, g, b]"
+                    : "three numbers [x, y, z]") +
                limits;
     } else if constexpr (std::is_same_v<T, ValueRange>) {
         return "two numbers, the first below the second, \"data\", or [] for none";

@@ -117,7 +117,7 @@ Vec3 lit_emission(const Piece& piece, const Reflect& reflect, double allowed) {
         piece,
         [&](double q) {
             const Reflection light = reflect(q);
-            return (piece.color_at(q) * light.diffuse + light.specular) *
+            return light.of(piece.color_at(q)) *
                    (piece.extinction_at(q) * piece.length * attenuation(piece.depth_at(q)));
         },
         largest, 0, 1, allowed);
@@ -176,7 +176,7 @@ void RayIntegral::end_at(double r, double coordinate) {
     Vec3 color = matter_.color_at(coordinate);
     if (light_) {
         const Reflection light = reflection_at(r);
-        color = color * light.diffuse + light.specular;
+        color = light.of(color);
     }
     color_ += color * clear_;
     clear_ = 0;

@@ -344,6 +344,45 @@ TEST(Reference, ThePowerRulesAreTheirFormulas) {
     }
 }
 
+TEST(Reference, AConeHasTheSlopeOfItsEnergyOrThePapers) {
+    const auto volume = slope(Vec3(1));
+    Scene scene = plain_scene();
+    scene.clip.low = Vec3(1), scene.clip.high = Vec3(6);
+    look(scene, *volume, Vec3(1, 2, 2));
+    scene.lights = {{.headlight = true}};
+    const double dot = Vec3(20, 30, 40).normalized().dot(Vec3(1, 2, 2).normalized());  // N.H, and N.L
+    scene.shading = {.model = ShadingModel::cone, .ka = 0, .kd = 0.25, .ks = 0.5, .exponent = 13};
+    auto pixel = reference_pixel(make_plan(scene, volume), 0, 0);
+    EXPECT_NEAR(pixel[0], pixel[3] * (0.25 * dot + 0.5 * (1 - 7 * (1 - dot))), kPromise);
+    scene.shading.cone_slope = ConeSlope::paper;
+    pixel = reference_pixel(make_plan(scene, volume), 0, 0);
+    EXPECT_NEAR(pixel[0], pixel[3] * (0.25 * dot + 0.5 * (1 - 13 * (1 - dot))), kPromise);
+}
+
+TEST(Reference, GoochGoesFromCoolToWarmAndNoFartherThanTheOpacity) {
+    const auto volume = slope(Vec3(1));
+    Scene scene = plain_scene();
+    scene.clip.low = Vec3(1), scene.clip.high = Vec3(6);
+    scene.transfer_function.points = {{0, 0.5, 0.25, 1, 0.2}};
+    look(scene, *volume, Vec3(1, 2, 2));
+    scene.lights = {{.headlight = true}};
+    const double dot = Vec3(20, 30, 40).normalized().dot(Vec3(1, 2, 2).normalized());
+    scene.shading.model = ShadingModel::gooch, scene.shading.kd = 0.5;
+    const Vec3 color(0.5, 0.25, 1), cool = color * 0.1 + Vec3(0, 0, 0.55),
+                                    warm = color * 0.3 + Vec3(0.3, 0.3, 0);
+    for (const CoolSide side : {CoolSide::shadow, CoolSide::light}) {
+        scene.shading.cool_side = side;
+        const double to_warm = (side == CoolSide::shadow ? 1 + dot : 1 - dot) / 2;
+        const auto pixel = reference_pixel(make_plan(scene, volume), 0, 0);
+        for (int c = 0; c < 3; ++c)
+            EXPECT_NEAR(pixel[static_cast<std::size_t>(c)],
+                        pixel[3] * (warm[c] * to_warm + cool[c] * (1 - to_warm)), kPromise);
+    }
+    scene.shading.cool = scene.shading.warm = Vec3(1), scene.shading.kd = 1;
+    const auto pixel = reference_pixel(make_plan(scene, volume), 0, 0);
+    for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(pixel[c], pixel[3], kPromise);
+}
+
 TEST(Reference, AFlatFieldGetsAmbientLightOnly) {
     const auto volume = volume_of({4, 4, 4}, 8, Vec3(1), [](const Index3&) { return 9; });
     for (const ShadingModel model : {ShadingModel::phong, ShadingModel::blinn_phong}) {

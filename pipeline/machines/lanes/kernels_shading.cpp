@@ -157,7 +157,7 @@ template <class L, bool kPlain>
 void shade_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
     std::conditional_t<kPlain, ShadingStage, const ShadingStage&> shading = plan.shading;
     if constexpr (kPlain) take_as_plain(shading);
-    const bool per_ray = shading.half_per_ray || shading.model == ShadingModel::phong;
+    const bool per_ray = shading.needs_ray();
     for (int at = 0; at < count; at += static_cast<int>(L::count())) {
         RayWords<L> ray;
         if (per_ray) {

@@ -155,7 +155,7 @@ int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, int steps
                        lanes::LitSamples& lit) {
     const hn::ScalableTag<Word> d;
     const auto zero = hn::Zero(d);
-    const bool per_ray = plan.shading.half_per_ray || plan.shading.model == ShadingModel::phong;
+    const bool per_ray = plan.shading.needs_ray();
     const bool from_samples = plan.gradient_from_samples();
     int count = 0;
     for (int at = 0; at < steps * kRays; at += kLanes) {

@@ -122,7 +122,10 @@ void draw_light(Draw& draw, Scene& scene) {
         scene.lights.push_back(light);
     }
     ShadingSettings& shading = scene.shading;
-    shading.model = draw.once_in(2) ? ShadingModel::phong : ShadingModel::blinn_phong;
+    shading.model = draw.one_of({ShadingModel::phong, ShadingModel::blinn_phong, ShadingModel::blinn_phong,
+                                 ShadingModel::cone, ShadingModel::gooch});
+    shading.cone_slope = draw.any_of<ConeSlope>(), shading.cool_side = draw.any_of<CoolSide>();
+    shading.cool = draw.vector(0, 1), shading.warm = draw.vector(0, 1);
     shading.gradient = draw.one_of({GradientRule::central, GradientRule::sobel, GradientRule::analytic,
                                     GradientRule::central, GradientRule::central_samples});
     shading.ka = draw.real(0, 1), shading.kd = draw.real(0, 1), shading.ks = draw.real(0, 1);
@@ -240,6 +243,7 @@ std::vector<Share> shares() {
         {"normals", [](const Plan& p) { return p.scene.output.normals && p.lit; }},
         {"gradients from samples", [](const Plan& p) { return p.gradient_from_samples(); }},
         {"light that fades in", [](const Plan& p) { return p.gradient.fades; }},
+        {"gooch", [](const Plan& p) { return p.lit && p.shading.model == ShadingModel::gooch; }},
         {"one voxel thick along x", [](const Plan& p) { return p.volume->dims.x == 1; }},
     };
 }
