@@ -19,6 +19,7 @@
 #include "pipeline/plan/plan.h"
 #include "pipeline/stages/compositing-inl.h"
 #include "pipeline/stages/gradient-inl.h"
+#include "pipeline/stages/inside-inl.h"
 #include "pipeline/stages/interpolation-inl.h"
 #include "pipeline/stages/location-inl.h"
 #include "pipeline/stages/shading-inl.h"
@@ -148,39 +149,97 @@ class Slabs {
         }
         carries_ = true;
     }
-    HWY_INLINE const Sample<W>& back() const { return M::kNeedsBack ? back_ : front_; }
+    HWY_INLINE Sample<W>& back() { return M::kNeedsBack ? back_ : front_; }
 
     // Stages 4, 3 and 5, 6: one slab between two samples, or a part of one.
-    HWY_INLINE void composite_slab(const Sample<W>& front, const Sample<W>& back, W length) {
+    HWY_INLINE void composite_slab(Sample<W>& front, Sample<W>& back, W length) {
         observer_.at(Part::classification);
         Slab<W> slab = classify(method_, front.input, back.input, length);
-        if (plan_.lit && any(constant<W>(0) < slab.alpha)) light(front, back, slab);
+        if (plan_.lit && any(constant<W>(0) < slab.alpha)) light(front, back, length, slab);
         observer_.at(Part::compositing);
         const Accumulated<W> before = pixel;
         composite(plan_.compositing, pixel, slab.color, slab.alpha);
         observer_.composited(slab, before, pixel);
     }
 
-    // Stages 3 and 5: what is seen of a slab, lit.
-    HWY_INLINE void light(const Sample<W>& front, const Sample<W>& back, Slab<W>& slab) const {
-        const std::array<W, 3> gradient = slab_gradient(front, back);
+    // Stages 3 and 5: what is seen of a slab, lit; by shading.inside with one normal or in pieces.
+    void light(Sample<W>& front, Sample<W>& back, W length, Slab<W>& slab) const {
+        const InsideStage& inside = plan_.inside;
+        if (inside.rule == InsideRule::front) return light_with(gradient_of(front), slab);
+        if (inside.rule == InsideRule::middle) return light_with(gradient_between(front, back, 1, 1), slab);
+        if (inside.rule == InsideRule::mean) {
+            std::array<W, 3> gradient = gradient_of(front);
+            const std::array<W, 3>& other = gradient_of(back);
+            observer_.at(Part::gradient);
+            for (std::size_t a = 0; a < 3; ++a) gradient[a] = gradient[a] + other[a];
+            return light_with(gradient, slab);
+        }
+        const W zero = constant<W>(0);
+        W cuts = zero;
+        const auto worth_it = !(slab.alpha < constant<W>(inside.least_cut));
+        if (any(worth_it)) {
+            const std::array<W, 3>&at_front = gradient_of(front), &at_back = gradient_of(back);
+            observer_.at(Part::normal);
+            cuts = select(worth_it, cuts_between(at_front, at_back), zero);
+        }
+        Slab<W> whole = slab;
+        if (any(cuts == zero)) light_with(gradient_between(front, back, 1, 1), whole);
+        slab.color = whole.color;
+        for (int bits = 1; bits <= kMostCuts; ++bits) {
+            const auto so_many = cuts == constant<W>(bits);
+            if (!any(so_many)) continue;
+            const std::array<W, 3> color = light_in_pieces(front, back, length, bits);
+            for (std::size_t c = 0; c < 3; ++c) slab.color[c] = select(so_many, color[c], slab.color[c]);
+        }
+    }
+
+    // The straight colour of a slab of 2^bits lit pieces.
+    std::array<W, 3> light_in_pieces(const Sample<W>& front, const Sample<W>& back, W length,
+                                     int bits) const {
+        const InsideStage& inside = plan_.inside;
+        PieceLight<W> sum = no_piece<W>(inside);
+        W near = front.input, near_length = constant<W>(0);
+        bool seen = false;  // something of the slab
+        for (int i = 1; i <= 1 << bits; ++i) {
+            observer_.at(Part::classification);
+            const bool last = i == 1 << bits;
+            const W far = last ? back.input : input_between(inside, front.input, back.input, i, bits);
+            const W far_length = last ? length : length_up_to(inside, length, i, bits);
+            Slab<W> piece = classify(method_, near, far, far_length - near_length);
+            if (any(constant<W>(0) < piece.alpha)) {
+                light_with(gradient_between(front, back, 2 * i - 1, bits + 1), piece, !seen);
+                seen = true;
+                add_piece(inside, sum, piece.color, piece.alpha);
+            }
+            near = far, near_length = far_length;
+        }
+        observer_.at(Part::shading);
+        return color_of_pieces(inside, sum);
+    }
+
+    // Lights a slab, or a piece of one, by one raw gradient; the slab's normal is that of its first piece.
+    void light_with(const std::array<W, 3>& gradient, Slab<W>& slab, bool is_first = true) const {
         observer_.at(Part::normal);
         const std::array<W, 3> normal = normalise(plan_.gradient, gradient);
         const W certain = plan_.gradient.fades ? confidence(plan_.gradient, gradient) : constant<W>(0);
-        observer_.lit(normal);
+        if (is_first) observer_.lit(normal);
         observer_.at(Part::shading);
         shade(plan_.shading, ray_, normal, slab.alpha, slab.color, certain);
     }
 
-    // The raw gradient that lights a slab: of its sample, or the sum of its two ends'.
-    HWY_INLINE std::array<W, 3> slab_gradient(const Sample<W>& front, const Sample<W>& back) const {
-        std::array<W, 3> gradient = gradient_at(front);
-        if constexpr (M::kNeedsBack) {
-            const std::array<W, 3> other = gradient_at(back);
-            observer_.at(Part::gradient);
-            for (std::size_t a = 0; a < 3; ++a) gradient[a] = gradient[a] + other[a];
-        }
-        return gradient;
+    // The raw gradient at an end, which two slabs share: computed once.
+    HWY_INLINE const std::array<W, 3>& gradient_of(Sample<W>& sample) const {
+        if (!sample.has_gradient) sample.gradient = gradient_at(sample), sample.has_gradient = true;
+        return sample.gradient;
+    }
+    // The raw gradient `part` 2^-bits of the way from one sample to another.
+    std::array<W, 3> gradient_between(const Sample<W>& front, const Sample<W>& back, int part,
+                                      int bits) const {
+        observer_.at(Part::location);
+        Sample<W> sample;
+        sample.location = location_between(plan_.inside, front.location, back.location, part, bits);
+        sample.position = position_of(sample.location);
+        return gradient_at(sample);
     }
 
     // Stage 2 at a location.
@@ -193,14 +252,18 @@ class Slabs {
     HWY_INLINE Sample<W> scalar_at(const std::array<W, 3>& location) const {
         Sample<W> sample;
         sample.location = location;
-        sample.position = cell_position(plan_.location, location);
-        // A part of a cell: what its meaning says and intervals do not see.
-        for (W& w : sample.position.weight)
-            w = within(w, 0, std::int64_t{1} << plan_.interpolation.weight_bits);
+        sample.position = position_of(location);
         observer_.at(Part::interpolation);
         sample.scalar =
             interpolate(plan_.interpolation, voxels_.cell(sample.position.cell), sample.position.weight);
         return sample;
+    }
+
+    HWY_INLINE CellPosition<W> position_of(const std::array<W, 3>& location) const {
+        CellPosition<W> position = cell_position(plan_.location, location);
+        // A part of a cell: what its meaning says and intervals do not see.
+        for (W& w : position.weight) w = within(w, 0, std::int64_t{1} << plan_.interpolation.weight_bits);
+        return position;
     }
 
     // Stage 3 at a sample: the raw gradient, per smallest voxel spacing.

@@ -29,6 +29,9 @@ struct Sample {
     CellPosition<W> position;
     W scalar;  // sample
     W input;   // in table entries
+    // Stage 3, where a slab beside it was lit by it.
+    std::array<W, 3> gradient;
+    bool has_gradient = false;
 };
 
 /// MIP, MinIP, average: what stands for a ray of `slabs` slabs, one at least.

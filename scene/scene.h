@@ -27,6 +27,7 @@ enum class AlphaEncoding { alpha, sqrt_alpha };  // how the table stores opacity
 enum class ShadingModel { none, phong, blinn_phong, cone, gooch };
 enum class ConeSlope { energy, paper };
 enum class CoolSide { shadow, light };
+enum class InsideRule { mean, front, middle, adaptive };  // where inside a slab its light is taken
 enum class PowerRule { squaring, parabola, table };
 enum class CompositingForm {
     automatic,
@@ -59,6 +60,7 @@ SQUINT_NAMES(AlphaEncoding, "alpha", "sqrt_alpha");
 SQUINT_NAMES(ShadingModel, "none", "phong", "blinn_phong", "cone", "gooch");
 SQUINT_NAMES(ConeSlope, "energy", "paper");
 SQUINT_NAMES(CoolSide, "shadow", "light");
+SQUINT_NAMES(InsideRule, "mean", "front", "middle", "adaptive");
 SQUINT_NAMES(PowerRule, "squaring", "parabola", "table");
 SQUINT_NAMES(CompositingForm, "auto", "w", "w_carry", "equation_9", "alpha", "back_to_front", "unit255_shift",
              "unit255_blinn");
@@ -121,6 +123,7 @@ struct ShadingSettings {
     PowerRule power = PowerRule::squaring;
     bool two_sided = false;
     double gradient_floor = 0;  // levels per smallest voxel spacing; 0: light does not fade in
+    std::optional<InsideRule> inside = std::nullopt;  // absent: the best that the method has
     ConeSlope cone_slope = ConeSlope::energy;
     CoolSide cool_side = CoolSide::shadow;
     Vec3 cool{0, 0, 0.55}, warm{0.3, 0.3, 0};   // gooch: Gooch et al. 1998, as its own colours
@@ -260,6 +263,10 @@ void visit_scene(S& scene, V&& visit) {
           "light counts by the length of the gradient over this, at most 1, in levels per smallest voxel "
           "spacing; 0: always "
           "in full");
+    visit(
+        "shading.inside", shading.inside,
+        "where inside a slab its light is taken: mean of the ends' gradients, front, middle, adaptive (1, 2 "
+        "or 4 pieces as it turns); default: mean; pc and pc_mid have one sample");
     visit("shading.cone_slope", shading.cone_slope, "cone: energy, (n + 1) / 2 of exponent n, or paper, n");
     visit("shading.cool_side", shading.cool_side, "gooch: what turns cool, shadow or light (as printed)");
     visit("shading.cool", shading.cool, "gooch: colour of the cool side");

@@ -108,6 +108,29 @@ void plan_classification(Plan& plan) {
     report_approximations(plan);
 }
 
+// ------------------------------------------------------------------------------------------- light
+
+// The rule for light inside a slab: the scene's, or the method's default.
+InsideRule inside_rule(Plan& plan) {
+    const std::optional<InsideRule>& asked = plan.scene.shading.inside;
+    const std::string_view method = name_of(plan.scene.classification.method);
+    if (!plan.lit) return InsideRule::front;
+    if (!plan.needs_back) {
+        if (asked)
+            plan.notes.push_back(
+                fmt::format("shading.inside = \"{}\" is ignored: {} has one sample a slab, which lights it",
+                            name_of(*asked), method));
+        return InsideRule::front;
+    }
+    const bool has_parts = std::visit([](const auto& m) { return !m.kPremultiplied; }, plan.method);
+    if (asked == InsideRule::adaptive && !has_parts)
+        throw InputError(fmt::format(
+            "{}: found \"adaptive\", but {} has no tables for parts of a slab; allowed: mean, front, middle, "
+            "or classification.method = \"pips\" or \"leg\"",
+            where(plan.scene, "shading.inside"), method));
+    return asked.value_or(InsideRule::mean);
+}
+
 // ----------------------------------------------------------------------- what is left out, and why
 
 // A transparent sample changes nothing: empty space can be skipped.
@@ -220,7 +243,8 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
     plan.to_average = rescale(in, fraction(in, Wire::classification_input), Wire::classification_input);
     plan_classification(plan);
     in.premultiplied = std::visit([](const auto& m) { return m.kPremultiplied; }, plan.method);
-    in.needs_back = plan.needs_back;
+    in.inside = inside_rule(plan);
+    plan.inside = build_inside(in, plan.location);
     plan.gradient = build_gradient(in);
     plan.shading = build_shading(in);
     report_shading(plan);
@@ -266,6 +290,7 @@ void set_active(Plan& plan, const std::array<bool, kWires>& rounded) {
     plan.input.active = is(Wire::classification_input);
     plan.gradient.active = is(Wire::spacing);
     plan.shading.active = is(Wire::material);
+    plan.inside.to_whole.active = is(Wire::lit_color);
     plan.real = true;
 }
 

@@ -9,6 +9,7 @@
 #include "pipeline/classification/methods.h"
 #include "pipeline/stages/compositing.h"
 #include "pipeline/stages/gradient.h"
+#include "pipeline/stages/inside.h"
 #include "pipeline/stages/interpolation.h"
 #include "pipeline/stages/location.h"
 #include "pipeline/stages/shading.h"
@@ -51,6 +52,7 @@ struct Plan {
     InputStage input;
     ClassificationMethod method;
     ShadingStage shading;
+    InsideStage inside;
     CompositingStage compositing;
     bool lit = false;
     bool projection_mode = false;  // mip, minip, average
@@ -80,6 +82,10 @@ struct Plan {
     std::string real_name() const { return float32 ? "float32" : "real"; }
     /// Slab methods and projections look at both ends of every slab, a ray's exit among them.
     bool samples_both_ends() const { return needs_back || projection_mode; }
+    /// Gradients that light a slab, side by side.
+    int gradients_a_slab() const { return inside.rule == InsideRule::mean ? 2 : 1; }
+    /// Whether stage 3 wants samples' locations, not their cells alone.
+    bool keeps_locations() const { return gradient_from_samples() || (lit && inside.samples_between()); }
     bool gradient_from_samples() const { return lit && gradient.rule == GradientRule::central_samples; }
     Spec spec(Wire wire) const { return specs[wire]; }
 };
@@ -100,7 +106,7 @@ template <class V>
 void visit_stages(Plan& plan, V&& v) {
     plan.location.visit(v), plan.interpolation.visit(v), plan.gradient.visit(v), plan.input.visit(v);
     std::visit([&](auto& method) { method.visit(v); }, plan.method);
-    plan.shading.visit(v), plan.compositing.visit(v);
+    plan.inside.visit(v), plan.shading.visit(v), plan.compositing.visit(v);
 }
 
 }  // namespace squint

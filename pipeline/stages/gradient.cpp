@@ -41,7 +41,7 @@ GradientStage build_gradient(const StageInputs& in) {
     if (const double floor = in.scene.shading.gradient_floor; in.lit && floor > 0) {
         require_integer_bits(in, Wire::confidence, 1, "a confidence of 1.0");
         // The sum of a slab's two gradients is twice as long as their mean.
-        fade_in_up_to(s, (in.needs_back ? 2 : 1) * floor * one);
+        fade_in_up_to(s, (in.inside == InsideRule::mean ? 2 : 1) * floor * one);
     }
     return s;
 }

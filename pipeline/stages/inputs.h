@@ -21,7 +21,7 @@ struct StageInputs {
     double most_steps = 1;       // slabs of the longest ray; not rounded to whole ones
     bool lit = false;            // whether stages 3 and 5 run
     bool premultiplied = false;  // whether slabs' colours carry their opacity: the classification's
-    bool needs_back = false;     // whether a slab takes the samples at both ends: likewise
+    InsideRule inside = InsideRule::front;  // where a slab's light is taken
 };
 
 /// A Rescale of numbers with `from_fraction` fraction bits to a wire.

@@ -99,7 +99,7 @@ template <class G, class L, bool kPlain>
 void find_normals(const Plan& plan, int count, lanes::LitSamples& lit) {
     GradientStage stage = plan.gradient;
     if constexpr (kPlain) take_as_plain(stage);
-    const bool both_ends = plan.needs_back;
+    const bool both_ends = plan.gradients_a_slab() == 2;
     const auto slab_gradient = [&]<class W>(WordTag<W>, int at) SQUINT_WRITTEN_OUT {
         std::array<W, 3> gradient = stored_gradient<W, kPlain>(stage, lit, 0, at);
         if (both_ends) {
@@ -127,6 +127,17 @@ void find_normals(const Plan& plan, int count, lanes::LitSamples& lit) {
         const std::array<L, 3> normal = normalise(stage, gradient);
         for (std::size_t a = 0; a < 3; ++a) store(normal[a], lit.normal[a].v + at);
         if (stage.fades) store(confidence(stage, gradient), lit.confidence.v + at);
+    }
+}
+
+/// Raw gradients alone, as 32-bit words.
+template <class G, bool kPlain>
+void find_gradients(const Plan& plan, int count, lanes::LitSamples& lit) {
+    GradientStage stage = plan.gradient;
+    if constexpr (kPlain) take_as_plain(stage);
+    for (int at = 0; at < count; at += static_cast<int>(G::count())) {
+        const std::array<G, 3> gradient = stored_gradient<G, kPlain>(stage, lit, 0, at);
+        for (std::size_t a = 0; a < 3; ++a) store(gradient[a], lit.gradient[a].v + at);
     }
 }
 
@@ -178,11 +189,15 @@ void shading_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::S
     if (ways.gradient.is_float) {
         using L = Lanes<float, KnownRescales::nothing>;
         kernels.find_normals = &find_normals<L, L, false>;
+        kernels.find_gradients = &find_gradients<L, false>;
         kernels.shade = &shade_samples<L, false>;
         return;
     }
     constexpr KnownRescales kEven = KnownRescales::halves_to_even;
     lanes::with_integer_word<Lanes, kEven>(ways.gradient, [&]<class G>() {
+        kernels.find_gradients = &find_gradients<G, false>;
+        if constexpr (std::is_same_v<G, Lanes<std::int32_t, kEven>>)
+            if (is_plain(plan.gradient, *plan.volume)) kernels.find_gradients = &find_gradients<G, true>;
         lanes::with_integer_word<Lanes, kEven>(ways.shading, [&]<class L>() {
             kernels.find_normals = &find_normals<G, L, false>;
             if constexpr (std::is_same_v<G, Lanes<std::int32_t, kEven>> && std::is_same_v<L, G>)

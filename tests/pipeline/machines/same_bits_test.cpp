@@ -205,6 +205,9 @@ Case draw_case(unsigned seed, const std::string& preset) {
     scene.classification = {};
     ClassificationSettings& method = scene.classification;
     method.method = draw.one_of({Method::pc, Method::pc_mid, draw.any_of<Method>(), draw.any_of<Method>()});
+    if (draw.once_in(2)) scene.shading.inside = draw.any_of<InsideRule>();
+    if (scene.shading.inside == InsideRule::adaptive && method.method != Method::leg)
+        method.method = Method::pips;
     if (scene.sampling.interpolation == InterpolationRule::nearest && method.method != Method::pc_mid)
         method.method = Method::pc;  // slab methods are refused there
     method.order = static_cast<int>(method.method == Method::leg ? draw.between(2, 4) : draw.between(1, 5));
@@ -242,6 +245,7 @@ std::vector<Share> shares() {
         {"depth", [](const Plan& p) { return p.scene.output.depth && !p.projection_mode; }},
         {"normals", [](const Plan& p) { return p.scene.output.normals && p.lit; }},
         {"gradients from samples", [](const Plan& p) { return p.gradient_from_samples(); }},
+        {"light at the middle", [](const Plan& p) { return p.inside.rule == InsideRule::middle; }},
         {"light that fades in", [](const Plan& p) { return p.gradient.fades; }},
         {"gooch", [](const Plan& p) { return p.lit && p.shading.model == ShadingModel::gooch; }},
         {"one voxel thick along x", [](const Plan& p) { return p.volume->dims.x == 1; }},
