@@ -234,6 +234,36 @@ test('a search stands with its formats beside the scene\'s own and those of Sque
   await page.close();
 });
 
+test('the first line is the answer, red where nothing keeps the bound', async () => {
+  for (const [run, file] of [['wires', wires], ['product', product], ['groups', groups]]) {
+    const page = await is.open(browser, file, 1280), { answer } = data(run);
+    assert.equal(await page.textContent('#answer'), answer.text);
+    assert.equal(await page.$eval('#answer', (e) => e.classList.contains('bad')), !answer.good);
+    await page.close();
+  }
+});
+
+test('printing draws every section, seen or not', async () => {
+  const page = await is.open(browser, wires, 1280);
+  await page.waitForTimeout(600);
+  await page.evaluate(() => dispatchEvent(new Event('beforeprint')));
+  const blank = await page.$$eval('section:not([hidden])', (all) => all.filter((s) => [...s.querySelectorAll('.chart:not(.chart .chart)')].some((c) => !c.hidden && !c.querySelector('canvas, .nothing')) || (s.id === 'pictures' && (!s.querySelector('.grid canvas') || [...s.querySelectorAll('.grid canvas')].some((c) => c.width < 2))) || (s.id === 'table' && !s.querySelector('tbody tr'))).map((s) => s.id));
+  assert.deepEqual(blank, []);
+  assert.deepEqual(page.said, []);
+  await page.close();
+});
+
+test('formats that stand alone are told from all of them at once', async () => {
+  const page = await is.open(browser, wires, 1280);
+  await is.seeAll(page);
+  assert.match(await page.textContent('#first-hint'), /^Wire by wire:/);
+  const command = await page.textContent('#combined-command');
+  assert.match(command, /^squint render .*--set 'precision\.color=.*--set 'precision\.transparency=.* --error$/);
+  const PATH = `${dirname(is.program)}:${process.env.PATH}`;
+  execFileSync('sh', ['-c', command + ' --json combined.json -q -o combined.exr'], { cwd: is.folder, env: { ...process.env, PATH } });
+  await page.close();
+});
+
 test('points that failed stand in the table with their reasons', async () => {
   const page = await is.open(browser, product, 1280), failed = data('product').points.filter((p) => p.status === 'failed');
   assert.ok(failed.length > 0);

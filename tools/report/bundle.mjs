@@ -10,7 +10,7 @@ const modules = (path) => read('node_modules/' + path);
 // In the order in which each finds the one before it.
 const libraries = [
   'vega/build/vega.min.js',
-  'vega-interpreter/build/vega-interpreter.min.js',
+  'vega-interpreter/build/vega-interpreter.js',
   'vega-lite/build/vega-lite.min.js',
   'img-comparison-slider/dist/index.js',
 ];
@@ -52,7 +52,12 @@ const escaped = (text) => text.replace(/&/g, '&amp;').replace(/</g, '&lt;').repl
 const plain = (script) => script.replace(/\/\/# sourceMappingURL=\S+/g, '').replace(/<\/script/g, '<\\/script').replace(/<!--/g, '<\\!--');
 const hash = (text) => `'sha256-${createHash('sha256').update(text, 'utf8').digest('base64')}'`;
 
-const library = plain(libraries.map(modules).join('\n'));
+// A module as a script: what it imports is vega's, what it exports becomes vega's.
+const asScript = (module) => `(function () {\n${module
+  .replace(/^import \{([^}]*)\} from 'vega-util';$/m, 'const {$1} = vega;')
+  .replace(/^export \{([^}]*)\};$/m, (_, names) => names.split(',').map((name) => name.trim().split(' as ')).map(([own, name = own]) => `vega.${name} = ${own};`).join(' '))}\n})();\n`;
+
+const library = plain(libraries.map((path) => /^export \{/m.test(modules(path)) ? asScript(modules(path)) : modules(path)).join('\n'));
 // Each after what it calls when it is read; one scope, closed to the page.
 const kScripts = ['data', 'charts', 'pareto', 'sensitivity', 'heat', 'ranges', 'search', 'pictures', 'table', 'page'];
 const script = plain(`'use strict';\n(() => {\n${kScripts.map((name) => read(`page/${name}.js`)).join('\n')}})();\n`);

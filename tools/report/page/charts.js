@@ -67,7 +67,9 @@ function drawWhenNear(place, draw) {
   near.unobserve(place);
   near.observe(place);
 }
-addEventListener('beforeprint', () => [...stale.keys()].forEach(drawStale));
+// What is drawn may ask for more to be drawn: a panel a stage.
+function drawAll() { while (stale.size) [...stale.keys()].forEach(drawStale); }
+addEventListener('beforeprint', drawAll);
 
 // ---------------------------------------------------------------- scales
 
@@ -81,15 +83,15 @@ function errorAxis(domain) {
   const scale = logarithmic() ? { type: 'log', nice: false, padding: 8 } : { zero: false, padding: 8 };
   return { type: 'quantitative', title: kFigures[state.figure], scale: domain ? { ...scale, domain } : scale, axis: { tickCount: 6, format: '~g', labelOverlap: true } };
 }
-// Half an LSB8, named at the right end; behind the points.
+// The bound, named at the right end; behind the points.
 function halfLine(domain) {
   if (!inLsb8()) return [];
   const y = { field: 'half', ...errorAxis(domain) };
-  return [{ data: { values: [{ half: kHalf }] }, mark: { type: 'rule', strokeDash: [5, 4], color: kSoft, strokeWidth: 1.2 }, encoding: { y } }];
+  return [{ data: { values: [{ half: bound() }] }, mark: { type: 'rule', strokeDash: [5, 4], color: kSoft, strokeWidth: 1.2 }, encoding: { y } }];
 }
 // Its name, before the points, on a white edge of its own.
 function halfName(domain) {
   if (!inLsb8()) return [];
-  const text = (look) => ({ data: { values: [{ half: kHalf }] }, mark: { type: 'text', align: 'right', baseline: 'bottom', dx: -4, dy: -3, fontSize: 11.5, text: 'half an LSB8', ...look }, encoding: { y: { field: 'half', ...errorAxis(domain) }, x: { value: 'width' } } });
+  const text = (look) => ({ data: { values: [{ half: bound() }] }, mark: { type: 'text', align: 'right', baseline: 'bottom', dx: -4, dy: -3, fontSize: 11.5, text: boundName(), ...look }, encoding: { y: { field: 'half', ...errorAxis(domain) }, x: { value: 'width' } } });
   return [text({ stroke: '#fff', strokeWidth: 4, color: '#fff' }), text({ color: kSoft })];
 }

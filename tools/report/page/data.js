@@ -7,7 +7,9 @@ const state = { against: '', channel: 'color', figure: 'rmse', cost: 'bits', fil
 const kFigures = { rmse: 'RMSE in LSB8', max: 'greatest error in LSB8', bias: 'bias in LSB8', psnr: 'PSNR in dB', ssim: 'SSIM' };
 const kChannels = { color: 'colour, linear light', alpha: 'opacity', color_srgb: 'colour on an sRGB display' };
 const kCosts = { bits: 'bits (words + operations)', word_bits: 'bits of words', multiplier_bits: 'bits of multipliers', divider_bits: 'bits of dividers', rounding_bits: 'bits of roundings', lookup_bits: 'bits looked up', table_bits: 'bits of tables', table_bytes: 'bytes of tables', pixel_bits: 'bits of a pixel', ms: 'ms a frame' };
-const kHalf = 0.5; // LSB8: what rounding to 8 bits may cost anyway
+// LSB8: what was asked for, or what rounding to 8 bits may cost anyway.
+const bound = () => data.answer.bound;
+const boundName = () => bound() === 0.5 ? 'half an LSB8' : `${number(bound())} LSB8`;
 const kStages = ['sample location', 'interpolation', 'gradient', 'classification', 'shading', 'compositing'];
 const kStageOf = {
   location: 0, direction: 0, weight: 0, length: 0,
@@ -32,7 +34,9 @@ const readJson = async (id) => JSON.parse(new TextDecoder().decode(await inflate
 async function readData() {
   data = await readJson('data');
   ({ points, entries } = data);
-  state.against = data.against[0];
+  state.against = data.answer.against ?? data.against[0];
+  state.figure = data.answer.figure;
+  if (data.search?.transfer === 'srgb') state.channel = 'color_srgb';
   const first = new Map(); // point -> its first entry: what it is called
   for (const entry of entries) if (!first.has(entry.point)) first.set(entry.point, entry);
   points.forEach((p, i) => {
@@ -42,6 +46,8 @@ async function readData() {
   });
 }
 
+// Of a search: seen from where nothing was tuned.
+const heldOut = (p) => data.search?.other_degrees?.includes(p.entry?.values.degrees) ?? false;
 const done = (p) => p.status === 'done';
 const kept = (p) => state.filter === null || state.filter.has(p.hash);
 const figuresOf = (p) => p.error?.[state.against]?.[state.channel];

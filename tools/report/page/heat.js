@@ -25,14 +25,14 @@ function heatMap() {
   const least = Math.min(...cells.map((c) => scaled(c.error))), most = Math.max(...cells.map((c) => scaled(c.error)));
   const values = cells.map(({ key: [x, y], error, n }) => {
     const depth = most > least ? (scaled(error) - least) / (most - least) : 0;
-    return { x, y, error: lifted(error, floor), text: String(+error.toPrecision(error >= 100 ? 3 : 2)), dark: (moreIsBetter() ? 1 - depth : depth) > 0.55, within: inLsb8() && error <= kHalf,
+    return { x, y, error: lifted(error, floor), text: String(+error.toPrecision(error >= 100 ? 3 : 2)), dark: (moreIsBetter() ? 1 - depth : depth) > 0.55, within: inLsb8() && error <= bound(),
       tip: { [ax.name]: x, [ay.name]: y, [kFigures[state.figure]]: number(error), points: n } };
   });
   const across = ordered(rows.map((r) => r.x), ax), down = ordered(rows.map((r) => r.y), ay), steep = across.some((t) => t.length > 0.13 * place.clientWidth / across.length);
   const x = { field: 'x', type: 'nominal', title: ax.name, sort: across, axis: { labelAngle: steep ? -40 : 0, labelLimit: 140, orient: 'bottom' } };
   const y = { field: 'y', type: 'nominal', title: ay.name, sort: down, axis: { labelLimit: 0.25 * place.clientWidth, maxExtent: 400 } };
   const color = { field: 'error', type: 'quantitative', title: kFigures[state.figure], scale: { type: logarithmic() ? 'log' : 'linear', scheme: 'blues', reverse: moreIsBetter(), nice: false }, legend: { orient: 'top', gradientLength: 260, format: '~g', tickCount: 4, offset: 6 } };
-  $('heat-hint').textContent = 'Medians over the other axes.' + (inLsb8() ? ' Bold: within half an LSB8.' : '');
+  $('heat-hint').textContent = 'Medians over the other axes.' + (inLsb8() ? ` Bold: within ${boundName()}.` : '');
   chart(place, `${kFigures[state.figure]} over ${ax.name} and ${ay.name}`, { height: down.length * Math.max(22, Math.min(34, 420 / down.length)), data: { values }, layer: [
     { mark: { type: 'rect', stroke: '#fff' }, encoding: { x, y, color } },
     ...(across.length <= 0.022 * place.clientWidth ? [{ mark: { type: 'text', fontSize: 11.5 }, encoding: { x, y, text: { field: 'text' }, color: { condition: { test: 'datum.dark', value: '#fff' }, value: kInk } } }] : []),

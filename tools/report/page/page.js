@@ -1,6 +1,8 @@
 // The page: filled once, drawn again when what is shown changes.
 function about() {
   document.title = $('title').textContent = data.title;
+  $('answer').textContent = data.answer.text;
+  $('answer').classList.toggle('bad', !data.answer.good);
   $('note').textContent = data.note;
   const failed = points.filter((p) => !done(p)).length;
   $('facts').textContent = `${entries.length} points, ${points.length} of them different${failed ? `, ${failed} failed` : ''}; squint ${data.version}. Errors in LSB8, 1/255 of full scale in linear light, over the foreground.`;
@@ -15,6 +17,8 @@ function about() {
 function draw() {
   const timed = points.some((p) => p.ms !== undefined), model = points.some((p) => p.model);
   $('pareto-hint').textContent = 'Points that no other beats in both are dark and joined. Click one for its picture; drag a box to keep only what is in it, here and below.' + (model ? ' Triangles: timed in the model, since no lane holds these formats.' : '');
+  $('pareto-title').textContent = timed ? 'Error against time and bits' : 'Error against bits';
+  if (points.some(heldOut)) $('pareto-hint').textContent += ' Pictures of views that took no part in the search are not among them.';
   $('pareto-charts').classList.toggle('two', timed);
   $('pareto-time').hidden = !timed;
   if (timed) pareto($('pareto-time'), (p) => p.ms ?? null, 'ms a frame', 'No point has this figure.');
@@ -52,9 +56,14 @@ async function start() {
   findAxes(), startSensitivity(), startHeat(), startPictures(), startTable(), startControls();
   if (!points.some((p) => p.audit)) $('ranges').hidden = true;
   draw();
-  const best = points.filter((p) => done(p) && has(p.hash)).reduce((m, p) => !m || badness(p) < badness(m) ? p : m, null);
+  $('combined-copy').addEventListener('click', () => copy($('combined-command').textContent, $('combined-copy')));
+  const seen = points.filter((p) => done(p) && has(p.hash)), found = data.search?.found.wires;
+  const best = seen.find((p) => found && Object.entries(found).every(([wire, spec]) => p.wires?.[wire] === spec || p.wires?.[wire]?.startsWith(spec.split(' ')[0] + ' ')))
+    ?? seen.find((p) => points.indexOf(p) === data.answer.point) ?? seen.reduce((m, p) => !m || badness(p) < badness(m) ? p : m, null);
   document.querySelector('.compare').hidden = !best;
   if (best) choose(best.hash);
   requestAnimationFrame(() => { document.documentElement.dataset.ready = 'yes'; });
+  // Printing waits for nobody: what it draws must be read by then.
+  setTimeout(async () => { audits ??= await readJson('audits'); await paintThumbnails(); }, 300);
 }
 start();

@@ -18,7 +18,7 @@ function lookOf(p, front) {
 
 function pareto(place, cost, title, without) {
   if (place === brushed) return;
-  const all = points.filter(done).map((p) => ({ p, hash: p.hash, cost: cost(p), error: errorOf(p), bad: badness(p) })).filter((r) => r.cost !== null && r.error !== null);
+  const all = points.filter((p) => done(p) && !heldOut(p)).map((p) => ({ p, hash: p.hash, cost: cost(p), error: errorOf(p), bad: badness(p) })).filter((r) => r.cost !== null && r.error !== null);
   if (!all.length) return nothing(place, without);
   const best = front(all), floor = floorOf(all.map((r) => r.error));
   const values = all.map(({ p, hash, cost, error }) => ({ hash, cost, shown: lifted(error, floor), front: best.has(hash), kept: kept(p), ...lookOf(p, best.has(hash)),

@@ -188,6 +188,15 @@ const watcher = new IntersectionObserver((seen) => {
     picture(target.dataset.key).then((image) => image && paint(target, image, cropOf(image)));
   }
 }, { rootMargin: '300px' });
+// All that are shown, seen or not: unpacking takes its time, for which printing does not wait.
+async function paintThumbnails() {
+  drawStale($('grid'));
+  for (const canvas of $('grid').querySelectorAll('canvas')) {
+    watcher.unobserve(canvas);
+    const image = await picture(canvas.dataset.key);
+    if (image) paint(canvas, image, cropOf(image));
+  }
+}
 function grid() {
   const by = { error: (p, q) => badness(p) - badness(q), cost: (p, q) => (costOf(p) ?? Infinity) - (costOf(q) ?? Infinity), sweep: () => 0 }[$('order').value];
   const list = points.filter((p) => done(p) && kept(p) && has(p.hash)).sort(by);

@@ -90,11 +90,11 @@ function wireSeries(kind, crossing) {
   }
   return { series, base, relative, part };
 }
-// The narrowest format measured that stays within half an LSB8, as all wider ones do.
+// The narrowest format measured that stays within the bound, as all wider ones do.
 function firstWithin(list) {
   let found = null;
   for (const r of [...list].reverse()) {
-    if (errorOf(r.p) > kHalf) break;
+    if (errorOf(r.p) > bound()) break;
     found = r;
   }
   return found;
@@ -102,7 +102,7 @@ function firstWithin(list) {
 
 function wireCurves() {
   const place = $('curves'), kind = $('kind').value, { series, base, relative, part } = wireSeries(kind, $('crossing').value);
-  $('sensitivity-hint').textContent = 'One curve a wire, the others as at the base point (hollow).' + (inLsb8() ? ' A ring: the first format that stays within half an LSB8, which 8-bit output loses anyway.' : '');
+  $('sensitivity-hint').textContent = 'One curve a wire, the others as at the base point (hollow).' + (inLsb8() ? ` A ring: the first format that stays within ${boundName()}${bound() === 0.5 ? ', which 8-bit output loses anyway' : ''}.` : '');
   place.className = series.size ? 'panels' : 'chart';
   if (!series.size) return $('first-format').replaceChildren(), nothing(place, 'No point has this figure.');
   const all = [...series.values()].flat(), floor = floorOf(all.map((r) => errorOf(r.p))), shown = (r) => lifted(errorOf(r.p), floor);
@@ -110,7 +110,7 @@ function wireCurves() {
   const panels = grouped([...series], ([wire]) => stageOf(wire) ?? 'all wires together', ([wire, list]) => {
     const first = inLsb8() ? firstWithin(list) : null;
     return list.map((r) => ({ wire, at: r.at, error: shown(r), hash: r.p.hash, base: r.base, first: r === first,
-      tip: { wire, format: r.p.wires?.[wire] ?? '', [kFigures[state.figure]]: number(errorOf(r.p)), ...(r === first ? { '': 'the first within half an LSB8' } : {}) } }));
+      tip: { wire, format: r.p.wires?.[wire] ?? '', [kFigures[state.figure]]: number(errorOf(r.p)), ...(r === first ? { '': `the first within ${boundName()}` } : {}) } }));
   });
   const stages = ['all wires together', ...kStages].filter((s) => panels.has(s));
   for (const child of [...place.children]) if (!stages.includes(child.dataset.stage)) clearChart(child), child.remove();
@@ -139,12 +139,22 @@ function wirePanel(panel, stage, values, domain, ends, title) {
 // Of wires varied as one there is no one format to name: the number of bits is.
 function firstFormats(series, base, bitsOf) {
   const place = $('first-format');
+  $('first-hint').textContent = '', $('combined').hidden = true;
   if (!inLsb8()) return place.replaceChildren();
   const rows = [...series].filter(([wire]) => stageOf(wire)).map(([wire, list]) => {
     const first = firstWithin(list), least = list.reduce((m, r) => errorOf(r.p) < errorOf(m.p) ? r : m, list[0]);
     return [wire, stageOf(wire), base?.wires?.[wire] ?? '', first ? first.p.wires?.[wire] ?? bitsOf(first) : 'none measured', number(errorOf((first ?? least).p))];
   });
   const cells = (tag, row) => row.map((cell, i) => element(tag, { class: i < 4 ? 'word' : '' }, cell));
-  place.replaceChildren(element('table', {}, element('thead', {}, element('tr', {}, ...cells('th', ['wire', 'stage', 'at the base point', 'first format within half an LSB8', kFigures[state.figure] + ' there']))),
+  place.replaceChildren(element('table', {}, element('thead', {}, element('tr', {}, ...cells('th', ['wire', 'stage', 'at the base point', `first format within ${boundName()}`, kFigures[state.figure] + ' there']))),
     element('tbody', {}, ...rows.map((row) => element('tr', {}, ...cells('td', row))))));
+  combined(series, base);
+}
+// What all these formats at once are has not been measured: how to measure it is said.
+function combined(series, base) {
+  const formats = [...series].map(([wire, list]) => [wire, firstWithin(list)?.p.wires?.[wire]]).filter(([, format]) => format);
+  if (!base || formats.length < 2) return;
+  $('first-hint').textContent = 'Wire by wire: each format stands alone, the other wires as at the base point. All of them at once have an error of their own, mostly a greater one; this command measures it:';
+  $('combined-command').textContent = `${base.command.replace(/ -o \S+$/, '')} ${formats.map(([wire, format]) => `--set 'precision.${wire}=${format}'`).join(' ')} --error`;
+  $('combined').hidden = false;
 }
