@@ -16,7 +16,7 @@ int run(const ReportArguments& a) {
     const bool page = a.format == "html";
     if (page)
         if (const std::string why = why_no_page(); !why.empty()) throw InputError("report: " + why);
-    const Json data = report_data(a.run);
+    const Json data = report_data(a.run, a.max_error);
     if (page) {
         const std::string path =
             a.output.empty() ? (std::filesystem::path(a.run) / "report.html").string() : a.output;

@@ -1,6 +1,7 @@
 // squint search: the cheapest formats under an error, as a preset file, with the way there as a run.
 #include "studies/search/search.h"
 #include "cli/common.h"
+#include "cli/shelf.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -45,10 +46,12 @@ std::string summary(const search::Settings& s, const search::Result& r) {
         if (!c->failure.empty()) text += fmt::format("{}: {}\n", c->name, c->failure);
     const double margin = s.most_error - r.found.other_error;
     text += fmt::format(
-        "found: {:.1f} % {} Squeeze's table in bits; on views it was not tuned on {:.4g} LSB8 {} the bound\n",
+        "found: {:.1f} % {} Squeeze's table in bits, with an error of {} against its {}; on views it was not "
+        "tuned on "
+        "{:.4g} LSB8 {} the bound\n",
         std::abs(100 * (1 - r.found.bits / r.squeeze.bits)),
-        r.found.bits <= r.squeeze.bits ? "below" : "above", std::abs(margin),
-        margin >= 0 ? "inside" : "outside");
+        r.found.bits <= r.squeeze.bits ? "below" : "above", text_of_error(r.found.error),
+        text_of_error(r.squeeze.error), std::abs(margin), margin >= 0 ? "inside" : "outside");
     return text + fmt::format("{}: squint render {}--set precision.preset={}\n", r.formats_file,
                               s.scenes.empty() ? "" : s.scenes[0] + " ",
                               std::filesystem::absolute(r.formats_file).string());
@@ -58,6 +61,7 @@ std::string summary(const search::Settings& s, const search::Result& r) {
 
 int run(const SearchArguments& a) {
     search::Settings settings = a.settings;
+    for (std::string& scene : settings.scenes) scene = file_of(scene);
     settings.cancelled = &interrupted;
     StatusLine line(!a.quiet);
     settings.progress = [&](const std::string& text) { line.show(text); };

@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "pipeline/record.h"
+#include "studies/sweep/answer.h"
 #include "studies/sweep/report_page.h"
 #include "studies/sweep/run.h"
 #include "studies/sweep/run_folder.h"
@@ -111,27 +112,30 @@ Json point_of(const Json& record) {
     return p;
 }
 
-std::vector<std::string> not_measured(const Json& sweep, const Json& points, std::size_t missing) {
+/// What a sweep can measure, and what it is where it was not: in a word, and in a line.
+constexpr std::array<std::string_view, 3> kMeasurements[] = {
+    {"time", "time", "Time: this sweep is not timed (measure.repeats)."},
+    {"real", "rounding alone", "Rounding alone, against the same pipeline in double (measure.real)."},
+    {"reference", "the whole error", "The whole error, against the exact integral (measure.reference)."},
+    {"srgb", "errors on an sRGB display", "Errors as an sRGB display shows them (measure.srgb)."},
+    {"ssim", "SSIM", "SSIM (measure.ssim)."},
+    {"audit", "ranges of wires", "Ranges, saturation, wrap and stuck transparency (measure.audit)."},
+    {"conservation", "C + T", "C + T for white matter (measure.conservation)."},
+};
+
+void add_what_was_not_measured(Json& data, const Json& sweep, const Json& points, std::size_t missing) {
     const auto measured = sweep["measured"].get<std::vector<std::string>>();
-    const auto has = [&](std::string_view name) {
-        return std::any_of(measured.begin(), measured.end(),
-                           [&](const std::string& m) { return m.starts_with(name); });
-    };
-    std::vector<std::string> out;
-    if (!has("time")) out.push_back("Time: this sweep is not timed (measure.repeats).");
-    if (!has("real")) out.push_back("Rounding alone, against the same pipeline in double (measure.real).");
-    if (!has("reference")) out.push_back("The whole error, against the exact integral (measure.reference).");
-    if (!has("srgb")) out.push_back("Errors as an sRGB display shows them (measure.srgb).");
-    if (!has("ssim")) out.push_back("SSIM (measure.ssim).");
-    if (!has("audit")) out.push_back("Ranges, saturation, wrap and stuck transparency (measure.audit).");
-    if (!has("conservation")) out.push_back("C + T for white matter (measure.conservation).");
-    out.push_back(
+    Json &words = data["unmeasured"] = Json::array(), &lines = data["not_measured"] = Json::array();
+    for (const auto& [name, word, line] : kMeasurements)
+        if (std::none_of(measured.begin(), measured.end(),
+                         [name = name](const std::string& m) { return m.starts_with(name); }))
+            words.push_back(word), lines.push_back(line);
+    lines.push_back(
         "Area and energy of hardware: bits are counted from the formats, by the rules in docs/sweeps.md.");
-    if (missing > 0) out.push_back(fmt::format("{} points have no record yet.", missing));
+    if (missing > 0) lines.push_back(fmt::format("{} points have no record yet.", missing));
     const auto failed =
         std::count_if(points.begin(), points.end(), [](const Json& p) { return p["status"] == "failed"; });
-    if (failed > 0) out.push_back(fmt::format("{} points failed: the table has their reasons.", failed));
-    return out;
+    if (failed > 0) lines.push_back(fmt::format("{} points failed: the table has their reasons.", failed));
 }
 
 // Points that nothing beats in both `cost` and error, as a set of indices.
@@ -315,7 +319,7 @@ std::vector<Column> columns_of(const Json& data) {
 
 }  // namespace
 
-Json report_data(const std::string& run) {
+Json report_data(const std::string& run, double most_error) {
     const Json sweep = read_json(run + "/sweep.json");
     if (sweep.value("schema", "") != "squint.sweep/1")
         throw InputError(fmt::format("{}/sweep.json: found another schema; allowed: squint.sweep/1", run));
@@ -357,8 +361,9 @@ Json report_data(const std::string& run) {
         if (against.erase(first)) names.push_back(first);
     for (const std::string& name : against) names.push_back(name);
     data["against"] = names;
-    data["not_measured"] = not_measured(sweep, points, missing.size());
+    add_what_was_not_measured(data, sweep, points, missing.size());
     data["points"] = std::move(points), data["entries"] = std::move(entries);
+    data["answer"] = answer_of(data, most_error);
     data["programs"] = programs;
     Json runs = Json::array();
     std::vector<fs::path> files;
@@ -393,6 +398,7 @@ std::string report_csv(const Json& data) {
 
 std::string report_markdown(const Json& data) {
     std::string text = fmt::format("# {}\n\n", data["title"].get<std::string>());
+    text += "**" + data["answer"]["text"].get<std::string>() + "**\n\n";
     if (const std::string note = data["note"]; !note.empty()) text += note + "\n\n";
     std::vector<Column> columns = columns_of(data);
     std::erase_if(columns, [](const Column& c) {  // a page is as wide as it is

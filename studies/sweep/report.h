@@ -8,9 +8,12 @@
 
 namespace squint::sweep {
 
-/// Everything that a report says, but its pictures (docs/sweeps.md, "The report's data").  Throws InputError
-/// when `run` is no run of a sweep.
-Json report_data(const std::string& run);
+/// What an answer's bound is where nobody asks for another: half an LSB8, which 8-bit output loses anyway.
+inline constexpr double kHalfLsb8 = 0.5;
+
+/// Everything that a report says, but its pictures (docs/sweeps.md, "The report's data"); its answer is the
+/// cheapest point within `most_error` LSB8, or a search's own.  Throws InputError when `run` is no run of a sweep.
+Json report_data(const std::string& run, double most_error = kHalfLsb8);
 
 /// One line a point: its axes, then its figures.
 std::string report_csv(const Json& data);

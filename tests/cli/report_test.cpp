@@ -78,6 +78,47 @@ TEST_F(ReportProgram, ReadsPointsOfTheFirstSchema) {
     }
 }
 
+// What the first line says is what the records hold.
+TEST_F(ReportProgram, TheFirstLineIsTheCheapestPointUnderTheBound) {
+    const std::vector<Json> all = records();
+    const auto error = [](const Json& r) { return r["error"]["real"]["color"]["rmse_lsb8"].get<double>(); };
+    const auto bits = [](const Json& r) { return r["cost"]["bits"].get<double>(); };
+    double least_error = 1e9, most_error = 0, most_bits = 0;
+    for (const Json& r : all)
+        if (r["status"] == "done")
+            least_error = std::min(least_error, error(r)), most_error = std::max(most_error, error(r)),
+            most_bits = std::max(most_bits, bits(r));
+    ASSERT_LT(least_error, most_error);
+    for (const double bound : {most_error * 2, (least_error + most_error) / 2}) {
+        const Json report = squint("report run --format json --max-error " + std::to_string(bound)).json();
+        const Json& answer = report["answer"];
+        const Json* cheapest = nullptr;
+        for (const Json& r : all)
+            if (r["status"] == "done" && error(r) <= bound && (!cheapest || bits(r) < bits(*cheapest)))
+                cheapest = &r;
+        ASSERT_NE(cheapest, nullptr);
+        EXPECT_EQ(report["points"][answer["point"].get<std::size_t>()]["hash"], (*cheapest)["hash"]);
+        EXPECT_EQ(answer["bits"], bits(*cheapest));
+        EXPECT_EQ(answer["error"], error(*cheapest));
+        EXPECT_EQ(answer["than_bits"], most_bits);
+        EXPECT_DOUBLE_EQ(answer["saving_percent"].get<double>(), 100 * (1 - bits(*cheapest) / most_bits));
+        EXPECT_EQ(answer["good"], true);
+        const std::string text = answer["text"];
+        EXPECT_NE(text.find(std::to_string((*cheapest)["cost"]["bits"].get<int>()) + " bits at "),
+                  std::string::npos)
+            << text;
+        EXPECT_NE(text.find("Not measured: time"), std::string::npos) << text;
+        const std::string page =
+            squint("report run --format markdown --max-error " + std::to_string(bound)).out;
+        EXPECT_NE(page.find("**" + text + "**"), std::string::npos);
+    }
+    const Json none =
+        squint("report run --format json --max-error " + std::to_string(least_error / 2)).json()["answer"];
+    EXPECT_EQ(none["good"], false);
+    EXPECT_TRUE(none["point"].is_null());
+    EXPECT_EQ(none["text"].get<std::string>().find("No point is within"), 0u) << none["text"];
+}
+
 TEST_F(ReportProgram, CommandsOfPointsRenderTheirPicturesAgain) {
     const Json report = squint("report run --format json").json();
     for (const Json& point : report["points"]) {
