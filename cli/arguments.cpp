@@ -1,9 +1,12 @@
 // The command line: the only file that includes CLI11 (18 s to compile).
 #include "cli/arguments.h"
 
+#include "cli/manual.h"
+#include "cli/shelf.h"
 #include "core/error.h"
 #include "pipeline/record.h"
 #include "scene/scene.h"
+#include "scene/toml.h"
 #include "studies/sweep/sweep_file.h"
 
 #include <fmt/format.h>
@@ -13,6 +16,7 @@
 #include <charconv>
 #include <map>
 #include <tuple>
+#include <utility>
 
 namespace squint::cli {
 namespace {
@@ -50,6 +54,11 @@ std::int64_t size_of(const std::string& text, const std::string& flag) {
     return value << shift;
 }
 
+/// `job`: the heading of the help that the verb stands under.
+CLI::App& add_verb(CLI::App& app, const char* job, const char* name, const char* help) {
+    return *app.add_subcommand(name, help)->group(job);
+}
+
 void add_json_flag(CLI::App& verb, bool& json) {
     verb.add_flag("--json", json, "Print JSON");
 }
@@ -81,14 +90,16 @@ E named(const std::string_view (&names)[n], const std::string& name) {
 }
 
 void add_scene(CLI::App& verb, SceneArguments& scene) {
-    verb.add_option("scene", scene.file, "Scene file (TOML); the built-in scene when left out")
+    verb.add_option(
+            "scene", scene.file,
+            "Scene file (TOML), or @NAME of one that comes with squint; the built-in scene when left out")
         ->type_name("SCENE.toml");
     add_set(verb, scene.overrides, "Set any key of the scene; may be repeated, the last wins");
     add_size(verb, scene.overrides);
 }
 
 void add_render(CLI::App& app, RenderArguments& a) {
-    CLI::App& verb = *app.add_subcommand("render", "Render a scene to EXR");
+    CLI::App& verb = add_verb(app, "Pictures", "render", "Render a scene to EXR");
     add_scene(verb, a.scene);
     verb.add_option(
             "-o,--output", a.output,
@@ -102,7 +113,8 @@ void add_render(CLI::App& app, RenderArguments& a) {
             "Write a record of the picture (schema squint.render/2): time, samples, path, memory, hash")
         ->type_name("FILE|-");
     verb.add_flag("--error", a.error,
-                  "Measure the error against the same scene in double, and each stage's share");
+                  "Measure the error against the same scene in double, and each stage's share: up to eight "
+                  "more pictures");
     verb.add_flag("--reference", a.reference, "Measure the error against the exact integral along each ray");
     verb.add_option("--reference-output", a.reference_output, "Write that integral's picture as EXR")
         ->type_name("OUT.exr");
@@ -149,8 +161,8 @@ void add_render(CLI::App& app, RenderArguments& a) {
 }
 
 void add_plan(CLI::App& app, PlanArguments& a) {
-    CLI::App& verb = *app.add_subcommand(
-        "plan",
+    CLI::App& verb = add_verb(
+        app, "What happens inside", "plan",
         "Say what a scene exercises: stages, wires, formats, words, tables, and what is left out and why");
     add_scene(verb, a.scene);
     verb.add_flag("--brief", a.brief, "A line a stage: its wires and their formats");
@@ -159,7 +171,8 @@ void add_plan(CLI::App& app, PlanArguments& a) {
 }
 
 void add_pixel(CLI::App& app, PixelArguments& a) {
-    CLI::App& verb = *app.add_subcommand("pixel", "Show every wire of one pixel's ray, sample by sample");
+    CLI::App& verb =
+        add_verb(app, "What happens inside", "pixel", "Show every wire of one pixel's ray, sample by sample");
     verb.add_option("scene_x_y", a.words,
                     "Scene file (built-in when left out), column from the left, row from the top")
         ->type_name("[SCENE.toml] X Y")
@@ -191,7 +204,7 @@ void add_pixel(CLI::App& app, PixelArguments& a) {
 }
 
 void add_number(CLI::App& app, NumberArguments& a) {
-    CLI::App& verb = *app.add_subcommand("number", "Calculate in fixed-point formats");
+    CLI::App& verb = add_verb(app, "What happens inside", "number", "Calculate in fixed-point formats");
     verb.add_option("words", a.words,
                     "RESULT NUMBER, or RESULT OPERATION OPERAND...; standard input when left out")
         ->type_name("");
@@ -217,9 +230,10 @@ void add_number(CLI::App& app, NumberArguments& a) {
 }
 
 void add_compare(CLI::App& app, CompareArguments& a) {
-    CLI::App& verb = *app.add_subcommand("compare", "Compare two pictures; exit code 1 when a bound fails");
-    verb.add_option("a", a.a, "Picture")->required()->type_name("A");
-    verb.add_option("b", a.b, "Picture to compare with")->required()->type_name("B");
+    CLI::App& verb =
+        add_verb(app, "Pictures", "compare", "Compare two pictures; exit code 1 when a bound fails");
+    CLI::Option* const first = verb.add_option("a", a.a, "Picture")->required()->type_name("A");
+    CLI::Option* const second = verb.add_option("b", a.b, "Picture to compare with")->type_name("B");
     verb.add_option("--diff", a.diff, "Write A - B: an EXR with its signs, or a PNG of its size")
         ->type_name("OUT");
     verb.add_option("--gain", a.gain, "Multiply the difference in --diff")->type_name("NUMBER");
@@ -228,19 +242,40 @@ void add_compare(CLI::App& app, CompareArguments& a) {
             "linear, or srgb: encode R, G and B first")
         ->check(CLI::IsMember({"linear", "srgb"}))
         ->type_name("NAME");
-    verb.add_option("--fail-above", a.fail_above, "Fail when any error is larger, in 1/255 of full scale")
+    verb.add_option("--max-error,--fail-above", a.fail_above,
+                    "Fail when any error is larger, in 1/255 of full scale")
         ->check(CLI::NonNegativeNumber)
         ->type_name("LSB8");
     verb.add_option("--min-psnr", a.min_psnr, "Fail when the PSNR over the foreground is lower")
         ->type_name("DB");
-    add_json_flag(verb, a.json);
+    CLI::Option* const json =
+        verb.add_option("--json", a.json,
+                        "Write the figures as JSON; without a file to standard output, in place of "
+                        "the table")
+            ->expected(0, 1)
+            ->type_name("FILE|-");
+    verb.callback([&verb, &a, first, second, json] {
+        if (json->count() > 0 && second->count() == 0 && !a.json.empty()) {
+            // What follows a bare --json is a picture.
+            const std::vector<CLI::Option*> order = verb.parse_order();
+            const auto at = [&](const CLI::Option* option) {
+                return std::find(order.begin(), order.end(), option);
+            };
+            a.b = at(json) < at(first) ? std::exchange(a.a, a.json) : a.json;
+            a.json = "-";
+        }
+        if (a.b.empty())
+            throw InputError("compare: one picture given; allowed: two; see squint compare --help");
+        if (json->count() > 0 && a.json.empty()) a.json = "-";
+    });
     verb.footer(
         "Different sizes or channels and values that are not finite fail, always.\n\n"
         "Example:\n  squint compare fixed.exr real.exr --min-psnr 60 --diff diff.exr");
 }
 
 void add_info(CLI::App& app, InfoArguments& a) {
-    CLI::App& verb = *app.add_subcommand("info", "Describe a volume: size, type, spacing, range, histogram");
+    CLI::App& verb =
+        add_verb(app, "Volumes", "info", "Describe a volume: size, type, spacing, range, histogram");
     verb.add_option("volume", a.volume, "NRRD or raw file, or a procedural volume by name")
         ->type_name("VOLUME");
     add_set(verb, a.overrides, "Set a volume.* key: what a raw file does not say");
@@ -253,7 +288,7 @@ void add_info(CLI::App& app, InfoArguments& a) {
 }
 
 void add_volume(CLI::App& app, VolumeArguments& a) {
-    CLI::App& verb = *app.add_subcommand("volume", "Write a procedural or raw volume as NRRD");
+    CLI::App& verb = add_verb(app, "Volumes", "volume", "Write a procedural or raw volume as NRRD");
     verb.add_option("volume", a.volume, "A procedural volume by name, or a NRRD or raw file")
         ->required()
         ->type_name("NAME|FILE");
@@ -278,15 +313,16 @@ void add_volume(CLI::App& app, VolumeArguments& a) {
 }
 
 void add_doctor(CLI::App& app, DoctorArguments& a) {
-    CLI::App& verb = *app.add_subcommand(
-        "doctor", "Check this installation: libraries, SIMD targets, threads, a test picture");
+    CLI::App& verb = add_verb(app, "This program", "doctor",
+                              "Check this installation: libraries, SIMD targets, threads, a test picture");
     add_json_flag(verb, a.json);
     verb.footer("Example:\n  squint doctor");
 }
 
 void add_hard(CLI::App& app, HardArguments& a) {
-    CLI::App& verb = *app.add_subcommand(
-        "hard", "Classify hard transfer functions with every method: errors against the exact integral");
+    CLI::App& verb =
+        add_verb(app, "What happens inside", "hard",
+                 "Classify hard transfer functions with every method: errors against the exact integral");
     verb.add_option("scenes", a.scenes,
                     "Scene files, and folders of them; default: the cases of configs/hard")
         ->type_name("SCENE.toml|FOLDER");
@@ -297,7 +333,8 @@ void add_hard(CLI::App& app, HardArguments& a) {
 }
 
 void add_table(CLI::App& app, TableArguments& a) {
-    CLI::App& verb = *app.add_subcommand("table", "Write the tables of a scene's classification method");
+    CLI::App& verb =
+        add_verb(app, "What happens inside", "table", "Write the tables of a scene's classification method");
     add_scene(verb, a.scene);
     verb.add_option("-o,--output", a.output,
                     "pi2d: EXR, row = front, column = back; the others: CSV, a row an entry, raw words")
@@ -307,8 +344,8 @@ void add_table(CLI::App& app, TableArguments& a) {
 }
 
 void add_sweep(CLI::App& app, SweepArguments& a) {
-    CLI::App& verb = *app.add_subcommand(
-        "sweep", "Render every point of a sweep file and measure its error, time and bits");
+    CLI::App& verb = add_verb(app, "Choosing formats", "sweep",
+                              "Render every point of a sweep file and measure its error, time and bits");
     verb.add_option("files", a.files, "Sweep file; with --collect the folders to join")
         ->required()
         ->type_name("SWEEP.toml");
@@ -328,7 +365,7 @@ void add_sweep(CLI::App& app, SweepArguments& a) {
             "Compute only every N-th point, beginning with the I-th")
         ->type_name("I/N");
     verb.add_flag("--collect", a.collect, "Join the folders of shards into one");
-    verb.add_flag("--dry-run", a.dry_run, "Print the points and an estimate of the time, and stop");
+    verb.add_flag("--dry-run", a.dry_run, "Print an estimate of the time and the points, and stop");
     verb.add_flag("--redo", a.redo, "Compute points again that are there");
     verb.add_option("--threads", a.threads,
                     "Points at a time; threads of a point that is timed; default: one a processor")
@@ -340,14 +377,28 @@ void add_sweep(CLI::App& app, SweepArguments& a) {
     verb.footer(
         "A killed run goes on where it was when the same command is given again.  Exit code 3: some points "
         "failed.\n\n"
+        "A sweep file, bits.toml (docs/sweeps.md has every key; @sweeps/section5 and others come with "
+        "squint):\n"
+        "  scene = \"head.toml\"               # left out: the built-in scene\n"
+        "  [base]                            # any key of a scene, for every point\n"
+        "  image.width = 128\n"
+        "  image.height = 128\n"
+        "  [[axis]]                          # a key and its values\n"
+        "  key = \"sampling.step\"\n"
+        "  values = [1, 0.5]\n"
+        "  [[axis]]                          # wires, and one part of their formats\n"
+        "  wires = [\"color\", \"transparency\"]\n"
+        "  fraction_bits = { from = 8, to = 15 }\n\n"
         "Examples:\n"
-        "  squint sweep configs/sweeps/compositing.toml -o run && squint report run -o report.html\n"
+        "  squint sweep bits.toml -o bits && squint report bits\n"
+        "  squint sweep @sweeps/compositing -o run && squint report run -o report.html\n"
         "  squint sweep head.toml --dry-run --set image.width=256 --set image.height=256\n"
         "  squint sweep head.toml --shard 2/8 -o piece2; squint sweep --collect piece* -o run");
 }
 
 void add_report(CLI::App& app, ReportArguments& a) {
-    CLI::App& verb = *app.add_subcommand("report", "Write what a sweep found as one page, or as numbers");
+    CLI::App& verb =
+        add_verb(app, "Choosing formats", "report", "Write what a sweep found as one page, or as numbers");
     verb.add_option("run", a.run, "The folder that squint sweep filled")->required()->type_name("RUN");
     verb.add_option("-o,--output", a.output,
                     "File to write; default: RUN/report.html for the page, standard output for numbers")
@@ -355,6 +406,13 @@ void add_report(CLI::App& app, ReportArguments& a) {
     verb.add_option("--format", a.format, "html, csv, json or markdown")
         ->check(CLI::IsMember({"html", "csv", "json", "markdown"}))
         ->type_name("NAME")
+        ->capture_default_str();
+    verb.add_option(
+            "--max-error", a.max_error,
+            "The report's first line names the cheapest point within this RMSE, in 1/255 of full scale; a "
+            "search has its own bound")
+        ->check(CLI::PositiveNumber)
+        ->type_name("LSB8")
         ->capture_default_str();
     verb.add_option_function<std::string>(
             "--pictures",
@@ -367,8 +425,8 @@ void add_report(CLI::App& app, ReportArguments& a) {
 }
 
 void add_search(CLI::App& app, SearchArguments& a) {
-    CLI::App& verb = *app.add_subcommand(
-        "search", "Find the cheapest formats that keep a scene's rounding error under a bound");
+    CLI::App& verb = add_verb(app, "Choosing formats", "search",
+                              "Find the cheapest formats that keep a scene's rounding error under a bound");
     search::Settings& s = a.settings;
     verb.add_option("scenes", s.scenes,
                     "Scene files, one set of formats for all; the built-in scene when left out")
@@ -445,6 +503,24 @@ void add_search(CLI::App& app, SearchArguments& a) {
         "  squint render head.toml --set precision.preset=$PWD/found/formats.toml && squint report found");
 }
 
+struct HelpArguments {
+    std::string verb, form;
+    bool list = false;
+};
+void add_help(CLI::App& app, HelpArguments& a) {
+    CLI::App& verb = add_verb(app, "This program", "help", "Show this help, or a verb's");
+    verb.add_option("verb", a.verb, "A verb")->type_name("VERB");
+    verb.add_option("--form", a.form,
+                    "As a man page (of squint, of a verb, of a scene's keys) or as a shell's completion")
+        ->check(CLI::IsMember(std::vector<std::string>(std::begin(kManualForms), std::end(kManualForms))))
+        ->type_name("NAME");
+    verb.add_flag("--list", a.list,
+                  "List the scenes and sweeps that come with squint: @lee_shin/figure_5 and others");
+    verb.footer(
+        "Examples:\n  squint help render\n  squint help render --form man | man -l -\n"
+        "  source <(squint help --form bash)");
+}
+
 /// The command as a shell would take it.
 std::string command_text(int argc, char** argv) {
     std::string text = "squint";
@@ -464,12 +540,99 @@ std::string command_text(int argc, char** argv) {
     return text;
 }
 
-/// CLI11's messages on one line, with where to look.
-std::string one_line(std::string message, const std::string& verb) {
+std::vector<std::string> flags_of(const CLI::App& verb) {
+    std::vector<std::string> names;
+    for (const CLI::Option* option : verb.get_options())
+        for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    return names;
+}
+
+/// "unknown WHAT "NAME"; did you mean ...?", or the names there are.
+std::string unknown(const char* what, const std::string& name, const std::vector<std::string>& names) {
+    const std::vector<std::string_view> candidates(names.begin(), names.end());
+    const std::string_view near = nearest_name(name, candidates);
+    return fmt::format(
+        "unknown {} {}; {}", what, in_quotes(name),
+        near.empty() ? "allowed: " + listed(candidates) : fmt::format("did you mean \"{}\"?", near));
+}
+
+/// CLI11's messages on one line, with where to look.  A slip of the keyboard is named before what it left out.
+std::string message_of(const CLI::App& verb, const CLI::ParseError& error) {
+    std::string message = error.what();
+    for (const std::string& word : verb.remaining())
+        if (word.starts_with("--")) {
+            const std::string flag = word.substr(0, word.find('='));
+            const std::vector<std::string> flags = flags_of(verb);
+            const std::string_view near = nearest_name(flag, {flags.begin(), flags.end()});
+            message = fmt::format("unknown flag {}{}", in_quotes(flag),
+                                  near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near));
+            break;
+        }
     std::replace(message.begin(), message.end(), '\n', ' ');
     while (!message.empty() && (message.back() == ' ' || message.back() == '.')) message.pop_back();
-    return fmt::format("{}{}; see squint{}{} --help", verb.empty() ? "" : verb + ": ", message,
-                       verb.empty() ? "" : " ", verb);
+    return fmt::format("{}: {}; see squint {} --help", verb.get_name(), message, verb.get_name());
+}
+
+FlagText text_of(const CLI::Option& option) {
+    FlagText flag{{},
+                  "",
+                  option.get_expected_min() == 0 && option.get_expected_max() > 0,
+                  {},
+                  option.get_description()};
+    for (const std::string& name : option.get_snames()) flag.names.push_back("-" + name);
+    for (const std::string& name : option.get_lnames()) flag.names.push_back("--" + name);
+    if (option.get_positional()) flag.names.push_back(option.get_name());
+    if (option.get_items_expected_max() == 0) return flag;
+    // CLI11 joins a value's name and its check: "NAME:{auto,model,lanes}".
+    const std::string type = option.get_type_name();
+    const std::size_t colon = type.find(':'),
+                      open = type.find('{', colon == std::string::npos ? type.size() : colon);
+    flag.value = type.substr(0, colon);
+    if (open != std::string::npos) {
+        std::string word;
+        for (const char c : type.substr(open + 1))
+            if (c == ',' || c == '}')
+                flag.choices.push_back(std::exchange(word, ""));
+            else
+                word += c;
+    }
+    return flag;
+}
+
+VerbText text_of(const CLI::App& app) {
+    VerbText verb{app.get_name(), app.get_group(), app.get_description(), app.get_footer(), {}, {}};
+    for (const CLI::Option* option : app.get_options())
+        (option->get_positional() ? verb.words : verb.flags).push_back(text_of(*option));
+    return verb;
+}
+
+std::vector<const CLI::App*> verbs_of(const CLI::App& app) {
+    return app.get_subcommands([](const CLI::App*) { return true; });
+}
+
+ProgramText program_text(const CLI::App& app) {
+    ProgramText program{app.get_description(), app.get_footer(), version(), text_of(app).flags, {}};
+    for (const CLI::App* verb : verbs_of(app)) program.verbs.push_back(text_of(*verb));
+    return program;
+}
+
+/// `all`: the help of the program.
+std::string help_text(const CLI::App& app, const std::string& all, const HelpArguments& a) {
+    if (a.list) {
+        std::string names;
+        for (const std::string& name : shelf()) names += name + "\n";
+        return names;
+    }
+    const std::vector<const CLI::App*> verbs = verbs_of(app);
+    const auto verb =
+        std::find_if(verbs.begin(), verbs.end(), [&](const CLI::App* v) { return v->get_name() == a.verb; });
+    if (!a.verb.empty() && verb == verbs.end()) {
+        std::vector<std::string> names;
+        for (const CLI::App* each : verbs) names.push_back(each->get_name());
+        throw InputError("help: " + unknown("verb", a.verb, names));
+    }
+    if (!a.form.empty()) return manual(program_text(app), a.form, a.verb);
+    return a.verb.empty() ? all : (*verb)->help("squint");
 }
 
 }  // namespace
@@ -493,28 +656,29 @@ Arguments parse(int argc, char** argv) {
     SearchArguments search;
     search.settings.folder = "found";
     add_render(app, render);
+    add_compare(app, compare);
     add_plan(app, plan);
     add_pixel(app, pixel);
+    add_table(app, table);
     add_number(app, number);
-    add_compare(app, compare);
+    add_hard(app, hard);
+    add_sweep(app, sweep);
+    add_search(app, search);
+    add_report(app, report);
     add_info(app, info);
     add_volume(app, volume);
     add_doctor(app, doctor);
-    add_hard(app, hard);
-    add_table(app, table);
-    add_sweep(app, sweep);
-    add_report(app, report);
-    add_search(app, search);
-    std::string about;
-    CLI::App& help = *app.add_subcommand("help", "Show this help, or a verb's");
-    help.add_option("verb", about, "A verb")->type_name("VERB");
-    help.footer("Example:\n  squint help render");
+    HelpArguments help;
+    add_help(app, help);
     app.footer(
         "`squint VERB --help` has every flag and an example; `squint render --scene-reference` every key of "
         "a scene.\n"
         "Exit codes: 0 done, 1 a comparison failed, 2 usage or input, 3 some points failed, 70 internal "
         "error, 130 interrupted.\n\n"
         "Example:\n  squint render -o out.exr --preview out.png");
+
+    const std::string all = app.help();  // after a verb is parsed, CLI11 would print its help
+    if (argc < 2) return Text{all};
 
     const auto chosen = [&]() -> std::string {
         const auto verbs = app.get_subcommands();
@@ -523,11 +687,20 @@ Arguments parse(int argc, char** argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::CallForHelp&) {
-        return Text{chosen().empty() ? app.help() : app.get_subcommands()[0]->help("squint")};
+        return Text{chosen().empty() ? all : app.get_subcommands()[0]->help("squint")};
     } catch (const CLI::CallForVersion&) {
         return Text{"squint " + version() + "\n"};
     } catch (const CLI::ParseError& error) {
-        throw InputError(one_line(error.what(), chosen()));
+        if (!chosen().empty()) throw InputError(message_of(*app.get_subcommands()[0], error));
+        const std::vector<std::string> words = app.remaining();
+        std::vector<std::string> names = flags_of(app);
+        const bool flag = !words.empty() && words[0].starts_with('-');
+        if (!flag) {
+            names.clear();
+            for (const CLI::App* each : verbs_of(app)) names.push_back(each->get_name());
+        }
+        throw InputError((words.empty() ? error.what() : unknown(flag ? "flag" : "verb", words[0], names)) +
+                         std::string("; squint help lists them"));
     }
     const std::string verb = chosen();
     if (verb == "render") return render;
@@ -543,12 +716,7 @@ Arguments parse(int argc, char** argv) {
     if (verb == "sweep") return sweep.command = command_text(argc, argv), sweep;
     if (verb == "report") return report;
     if (verb == "search") return search.settings.command = command_text(argc, argv), search;
-    if (verb == "help" && !about.empty()) {
-        const auto of = app.get_subcommands([&](const CLI::App* each) { return each->get_name() == about; });
-        if (of.empty()) throw InputError(fmt::format("help: no verb \"{}\"; squint help lists them", about));
-        return Text{of[0]->help("squint")};
-    }
-    if (verb == "help") return Text{app.help()};
+    if (verb == "help") return Text{help_text(app, all, help)};
     throw InputError("no verb given; squint help lists them");
 }
 

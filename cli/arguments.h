@@ -43,9 +43,9 @@ struct NumberArguments {
     bool json = false;
 };
 struct CompareArguments {
-    std::string a, b, diff;
+    std::string a, b, diff, json;  // json: a file, or - for standard output
     double gain = 1;
-    bool srgb = false, json = false;
+    bool srgb = false;
     std::optional<double> fail_above;  // LSB8
     std::optional<double> min_psnr;    // dB
 };
@@ -80,6 +80,7 @@ struct SweepArguments {
 };
 struct ReportArguments {
     std::string run, output, format = "html";
+    double max_error = 0.5;  // LSB8
     std::int64_t most_picture_bytes = 24 << 20;
 };
 struct SearchArguments {

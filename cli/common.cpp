@@ -1,5 +1,7 @@
 #include "cli/common.h"
 
+#include "cli/shelf.h"
+#include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/procedural.h"
 #include "core/volume_source.h"
@@ -25,9 +27,14 @@ void print_json(const nlohmann::ordered_json& json) {
     print(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
 }
 
+void write_json(const std::string& path, const nlohmann::ordered_json& json) {
+    if (path == "-") return print_json(json);
+    write_text_whole(path, json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+}
+
 Scene read(const SceneArguments& arguments) {
     Scene scene = arguments.file.empty() ? scene_with(built_in_scene(), arguments.overrides)
-                                         : read_scene(arguments.file, arguments.overrides);
+                                         : read_scene(file_of(arguments.file), arguments.overrides);
     scene.precision = resolved_precision(scene);
     return scene;
 }
@@ -129,20 +136,24 @@ std::string table_text(const std::vector<std::vector<std::string>>& rows, std::s
     return text;
 }
 
-StatusLine::StatusLine(bool wanted) : shown_(wanted && isatty(STDERR_FILENO)) {}
+StatusLine::StatusLine(bool wanted) : shown_(wanted), terminal_(isatty(STDERR_FILENO)) {
+    if (!terminal_)
+        last_ = std::chrono::steady_clock::now();  // what is done within ten seconds needs no line
+}
 
 void StatusLine::clear() const {
-    if (shown_) std::fputs("\r\033[K", stderr);
+    if (shown_ && terminal_) std::fputs("\r\033[K", stderr);
 }
 
 bool StatusLine::due() const {
-    return shown_ && std::chrono::steady_clock::now() - last_ >= std::chrono::milliseconds(100);
+    using namespace std::chrono;
+    return shown_ && steady_clock::now() - last_ >= (terminal_ ? milliseconds(100) : milliseconds(10'000));
 }
 
 void StatusLine::show(const std::string& text, bool last) {
-    if (!shown_ || (!last && !due())) return;
+    if (!shown_ || (!(last && terminal_) && !due())) return;
     last_ = std::chrono::steady_clock::now();
-    std::fputs(("\r\033[K" + text).c_str(), stderr);
+    std::fputs((terminal_ ? "\r\033[K" + text : text + "\n").c_str(), stderr);
 }
 
 std::string text_of_time(double seconds) {

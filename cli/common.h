@@ -21,6 +21,8 @@ inline constexpr int kDone = 0, kComparisonFailed = 1, kUsage = 2, kSomeFailed =
 /// Writes to standard output.  Throws InputError when it cannot be written.
 void print(std::string_view text);
 void print_json(const nlohmann::ordered_json& json);
+/// To a file, whole or not at all, or - for standard output.
+void write_json(const std::string& path, const nlohmann::ordered_json& json);
 
 /// The scene asked for, its preset file merged in: what is planned, rendered and recorded.
 Scene read(const SceneArguments& arguments);
@@ -46,7 +48,8 @@ std::string text_of_count(std::int64_t count);
 /// the right.
 std::string table_text(const std::vector<std::vector<std::string>>& rows, std::string_view indent = "");
 
-/// One line on a terminal's standard error, rewritten a few times a second; nothing elsewhere.
+/// One line on a terminal's standard error, rewritten a few times a second; elsewhere (a log) a line every ten
+/// seconds.
 class StatusLine {
   public:
     explicit StatusLine(bool wanted);
@@ -55,10 +58,11 @@ class StatusLine {
     /// `last`: shown however soon it comes.
     void show(const std::string& text, bool last = false);
     bool due() const;  // whether show() would show something now
+    bool rewrites() const { return terminal_; }
 
   private:
-    bool shown_;
-    std::chrono::steady_clock::time_point last_{};
+    bool shown_, terminal_;
+    std::chrono::steady_clock::time_point last_;
 };
 
 /// "3.2 s", "12 min 5 s", "3 h 20 min".

@@ -129,16 +129,15 @@ int run(const CompareArguments& a) {
         if (!comparison.all.empty()) throw;  // the pictures are well: the difference cannot be written
         failed = {error.what()};
     }
-    if (a.json)
-        print_json(Json{{"schema", "squint.compare/1"},
-                        {"version", version()},
-                        {"a", a.a},
-                        {"b", a.b},
-                        {"transfer", a.srgb ? "srgb" : "linear"},
-                        {"channels", json_of(comparison)},
-                        {"failed", failed}});
-    else if (!comparison.all.empty())
-        print(figures_text(comparison, x));
+    if (!a.json.empty())
+        write_json(a.json, Json{{"schema", "squint.compare/1"},
+                                {"version", version()},
+                                {"a", a.a},
+                                {"b", a.b},
+                                {"transfer", a.srgb ? "srgb" : "linear"},
+                                {"channels", json_of(comparison)},
+                                {"failed", failed}});
+    if (a.json != "-" && !comparison.all.empty()) print(figures_text(comparison, x));
     for (const std::string& line : failed) std::fputs(fmt::format("squint: {}\n", line).c_str(), stderr);
     return failed.empty() ? kDone : kComparisonFailed;
 }

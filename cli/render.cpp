@@ -24,25 +24,23 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// A bar on standard error while a picture is being made; nothing where that is no terminal.
+/// A bar on a terminal's standard error while a picture is being made; elsewhere a line every ten seconds.
 class ProgressBar {
   public:
-    explicit ProgressBar(bool wanted) : shown_(wanted && isatty(STDERR_FILENO)) {}
-    ~ProgressBar() {
-        if (shown_) std::fputs("\r\033[K", stderr);
-    }
+    explicit ProgressBar(bool wanted) : line_(wanted) {}
     void operator()(double part) {
-        if (!shown_) return;
         const std::lock_guard lock(mutex_);
         const int percent = static_cast<int>(100 * part);
         if (percent <= percent_) return;
+        if (!line_.due()) return;
         percent_ = percent;
         const std::string bar(static_cast<std::size_t>(percent * 2 / 5), '#');
-        std::fputs(fmt::format("\r[{:<40}] {:3} %", bar, percent).c_str(), stderr);
+        line_.show(line_.rewrites() ? fmt::format("[{:<40}] {:3} %", bar, percent)
+                                    : fmt::format("{} %", percent));
     }
 
   private:
-    bool shown_;
+    StatusLine line_;
     int percent_ = -1;
     std::mutex mutex_;
 };
@@ -130,6 +128,16 @@ std::string error_text(const Errors& errors) {
     return text;
 }
 
+/// What --error costs: a picture in double, and one a stage that rounds, in words as this one.
+std::string price_of_errors(const Plan& plan, const RenderStatistics& statistics) {
+    std::ptrdiff_t stages = 0;
+    if (!plan.real)
+        stages = std::count_if(plan.stages.begin(), plan.stages.end(),
+                               [](const StageReport& s) { return s.modelled; });
+    return fmt::format("  measuring the error: {} more pictures, about {}\n", stages + 1,
+                       text_of_time(static_cast<double>(stages + 1) * statistics.seconds));
+}
+
 struct Job {
     const RenderArguments& arguments;
     Scene scene;
@@ -182,7 +190,10 @@ Json render_frame(const Job& job, int frame) {
         rendering = render(plan, options);
         options.progress = nullptr;
         bar.reset();
-        if (a.error) errors = rounding_errors(plan, rendering.image, options, frame);
+        if (a.error) {
+            if (!a.quiet) std::fputs(price_of_errors(plan, rendering.statistics).c_str(), stderr);
+            errors = rounding_errors(plan, rendering.image, options, frame);
+        }
         if (a.reference || !a.reference_output.empty()) {
             ProgressBar second(!a.quiet);
             ReferenceOptions exact{.threads = options.threads, .cancelled = &interrupted};
@@ -267,10 +278,7 @@ int run(const RenderArguments& a) {
                 {"pictures", Json::array()}};
     for (Json& picture : pictures)
         picture.erase("wires"), picture.erase("warnings"), record["pictures"].push_back(picture);
-    if (a.json == "-")
-        print_json(record);
-    else
-        write_text_whole(a.json, record.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+    write_json(a.json, record);
     return kDone;
 }
 

@@ -1,5 +1,6 @@
 // squint sweep: every point of a sweep file, into a folder that a killed run goes on with.
 #include "cli/common.h"
+#include "cli/shelf.h"
 #include "core/error.h"
 #include "studies/sweep/run.h"
 
@@ -31,12 +32,11 @@ int join(const SweepArguments& a) {
 
 int say_forecast(const SweepFile& sweep, const RunOptions& options) {
     const Forecast f = forecast(sweep, options);
-    std::string text;
-    for (const std::string& line : f.lines) text += line + "\n";
-    text += fmt::format(
+    std::string text = fmt::format(
         "{} points, {} of them different, {} to compute; about {} ({:.0f} ms a point, {} pictures to compare "
         "with)\n",
         f.points, f.distinct, f.missing, text_of_time(f.seconds), 1000 * f.seconds_a_point, f.baselines);
+    for (const std::string& line : f.lines) text += line + "\n";
     print(text);
     return kDone;
 }
@@ -48,7 +48,7 @@ int run(const SweepArguments& a) {
     if (a.files.size() != 1)
         throw InputError(fmt::format(
             "sweep: {} files given; allowed: one sweep file, or --collect and folders", a.files.size()));
-    const SweepFile sweep = read_sweep(a.files[0], a.overrides);
+    const SweepFile sweep = read_sweep(file_of(a.files[0]), a.overrides);
     RunOptions options;
     options.folder = a.output;
     options.shard = a.shard, options.shards = a.shards, options.threads = a.threads, options.redo = a.redo;

@@ -112,9 +112,22 @@ TEST_F(SweepProgram, SaysWhatItWouldDoAndWritesNothing) {
     write("s.toml", kBase + "[[axis]]\nkey = 'sampling.step'\nvalues = [1, 2, 1]\n");
     const Outcome outcome = squint("sweep s.toml -o run --dry-run");
     EXPECT_EQ(outcome.code, 0) << outcome.err;
-    EXPECT_NE(outcome.out.find("3 points, 2 of them different, 2 to compute; about "), std::string::npos);
+    EXPECT_TRUE(outcome.out.starts_with("3 points, 2 of them different, 2 to compute; about "))
+        << outcome.out;
     EXPECT_NE(outcome.out.find("sampling.step = 2"), std::string::npos);
     EXPECT_FALSE(has("run"));
+}
+
+// The example of `sweep --help` is a sweep file.
+TEST_F(SweepProgram, HelpHasASweepFileThatRuns) {
+    const std::string help = squint("sweep --help").out, begin = "  scene = \"head.toml\"";
+    const std::size_t from = help.find("  [base]"), end = help.find("\n\n", from);
+    ASSERT_NE(help.find(begin), std::string::npos);
+    ASSERT_NE(from, std::string::npos);
+    write("s.toml", help.substr(from, end - from) + "\n");
+    const Outcome outcome = squint("sweep s.toml --dry-run --set image.width=8 --set image.height=8");
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_TRUE(outcome.out.starts_with("16 points, ")) << outcome.out;
 }
 
 TEST_F(SweepProgram, ComputesAgainWhatLacksAMeasurement) {

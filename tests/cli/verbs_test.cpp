@@ -33,11 +33,30 @@ TEST_F(Verbs, EachHasHelpWithAnExample) {
 }
 
 TEST_F(Verbs, UsageErrorsExitWith2) {
-    expect_refusal(squint(""), "squint help");
-    expect_refusal(squint("rendr"), "rendr");
-    expect_refusal(squint("help rendr"), "rendr");
+    expect_refusal(squint("rendr"), "unknown verb \"rendr\"; did you mean \"render\"?");
+    expect_refusal(squint("rendr --size 3x3"), "did you mean \"render\"?");
+    expect_refusal(squint("frobnicate"), "allowed: render, compare, ");
+    expect_refusal(squint("help rendr"), "unknown verb \"rendr\"; did you mean \"render\"?");
+    expect_refusal(squint("render --outptu=a.exr"), "unknown flag \"--outptu\"; did you mean \"--output\"?");
+    expect_refusal(squint("compare --fial-above 3"), "did you mean \"--fail-above\"?");
+    expect_refusal(squint("--verson"), "did you mean \"--version\"?");
     expect_refusal(squint("compare a.exr"), "see squint compare --help");
     expect_refusal(squint("plan --json=yes=no"), "plan");
+}
+
+TEST_F(Verbs, TheProgramAlonePrintsItsHelpByJob) {
+    const Outcome alone = squint("");
+    EXPECT_EQ(alone.code, 0);
+    EXPECT_EQ(alone.out, squint("--help").out);
+    EXPECT_EQ(alone.out, squint("help").out);
+    std::size_t last = 0;
+    for (const char* job : {"Pictures:\n  render", "What happens inside:\n  plan",
+                            "Choosing formats:\n  sweep", "Volumes:\n  info", "This program:\n  doctor"}) {
+        const std::size_t at = alone.out.find(job);
+        EXPECT_NE(at, std::string::npos) << job;
+        EXPECT_GT(at, last) << job;
+        last = at;
+    }
 }
 
 TEST_F(Verbs, VersionIsOneLine) {
@@ -173,6 +192,15 @@ TEST_F(Verbs, CompareMeasuresAndJudges) {
     EXPECT_EQ(green["max_error_lsb8"], 63.75);
     EXPECT_TRUE(r.json()["channels"]["all"]["R"]["identical"]);
 
+    // A bare --json goes to standard output wherever it stands; a file leaves the table there.
+    for (const char* words :
+         {"--json a.exr b.exr", "a.exr --json b.exr", "a.exr b.exr --json -", "--json - a.exr b.exr"})
+        EXPECT_EQ(squint(std::string("compare ") + words).out, r.out) << words;
+    const Outcome filed = squint("compare a.exr b.exr --json c.json");
+    EXPECT_EQ(filed.out, squint("compare a.exr b.exr").out);
+    EXPECT_EQ(contents(folder / "c.json"), r.out);
+    expect_refusal(squint("compare a.exr --json"), "one picture given");
+    EXPECT_EQ(squint("compare a.exr b.exr --max-error 63").code, 1);
     const Outcome bounded = squint("compare a.exr b.exr --fail-above 63");
     EXPECT_EQ(bounded.code, 1);
     EXPECT_EQ(bounded.err, "squint: compare: G: error of 63.75 LSB8 at 2 1, allowed: 63\n");
