@@ -2,10 +2,7 @@
 //
 //     find_package(squint REQUIRED)
 //     target_link_libraries(minimal PRIVATE squint::pipeline)
-#include <core/compare.h>
-#include <core/error.h>
-#include <core/volume_source.h>
-#include <pipeline/render.h>
+#include <squint/squint.h>
 
 #include <iostream>
 

@@ -22,3 +22,17 @@ if(NOT EXISTS ${room}/minimal.exr)
   message(FATAL_ERROR "minimal wrote no picture")
 endif()
 run(${room}/prefix/bin/squint --version)
+run(${room}/prefix/bin/squint render @lee_shin/figure_5 --size 16x16 -q -o ${room}/figure_5.exr)
+foreach(file share/man/man1/squint-render.1 share/man/man5/squint-scene.5 share/bash-completion/completions/squint
+             share/zsh/vendor-completions/_squint share/fish/vendor_completions.d/squint.fish share/doc/squint/docs/scene.md)
+  if(NOT EXISTS ${room}/prefix/${file})
+    message(FATAL_ERROR "${file} is not installed")
+  endif()
+endforeach()
+
+# One header for those who want one, without SIMD.
+file(WRITE ${room}/one.cpp "#include <squint/squint.h>\n")
+run(${COMPILER} -std=c++20 -M -I${room}/prefix/include -I/usr/include/Imath ${room}/one.cpp)
+if(output MATCHES "/hwy/" OR NOT output MATCHES "squint/pipeline/render.h")
+  message(FATAL_ERROR "squint.h includes: ${output}")
+endif()

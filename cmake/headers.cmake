@@ -1,0 +1,15 @@
+# Installs the headers of the rooms below FOLDER, as <squint/core/volume.h>: what they include of each other by the path in
+# the tree is included by the installed one.  cmake -DSOURCE= -DFOLDER= -DROOMS=core,scene -P headers.cmake
+string(REPLACE "," ";" rooms ${ROOMS})
+string(REPLACE "," "|" any ${ROOMS})
+foreach(room ${rooms})
+  file(GLOB_RECURSE headers RELATIVE ${SOURCE} ${SOURCE}/${room}/*.h)
+  foreach(header ${headers} ${room}.h)
+    if(EXISTS ${SOURCE}/${header})
+      file(READ ${SOURCE}/${header} text)
+      string(REGEX REPLACE "#include \"(${any})/([^\"]+)\"" "#include <squint/\\1/\\2>" text "${text}")
+      file(WRITE ${FOLDER}/${header} "${text}")
+    endif()
+  endforeach()
+endforeach()
+file(COPY ${SOURCE}/cmake/squint.h DESTINATION ${FOLDER})
