@@ -21,6 +21,12 @@ const Format& format_of(const Plan& plan, int wire) {
     return plan.specs.spec[static_cast<std::size_t>(wire)].format;
 }
 
+/// What arrived on a wire: its word, or without rounding the value itself.
+double value_of(const Plan& plan, const TraceEvent& event) {
+    const Format& format = format_of(plan, event.wire);
+    return plan.real ? event.exact / static_cast<double>(format.one()) : to_real(event.raw, format);
+}
+
 std::string heading(const Plan& plan, const PixelArguments& a, const RayTrace& trace) {
     const RaySetup& s = trace.setup;
     std::string text = fmt::format("pixel {} {}: {} slabs", a.column, a.row, s.slabs);
@@ -30,7 +36,8 @@ std::string heading(const Plan& plan, const PixelArguments& a, const RayTrace& t
     text += fmt::format("first sample at voxel {:.6f} {:.6f} {:.6f}, V = {:.6f} {:.6f} {:.6f}\n", s.first.x,
                         s.first.y, s.first.z, s.step.x, s.step.y, s.step.z);
     if (plan.real)
-        text += fmt::format("precision is {}; shown are the words of preset wide\n", plan.real_name());
+        text += fmt::format("precision is {}: nothing is rounded; the formats are those of wide\n",
+                            plan.real_name());
     return text + "\n";
 }
 
@@ -42,13 +49,14 @@ std::string events_text(const Plan& plan, const PixelArguments& a, const RayTrac
         const auto w = static_cast<std::size_t>(e.event.wire);
         const Format& format = format_of(plan, e.event.wire);
         // The exact value in the same units as the value; the error in units of the wire's last bit.
-        rows.push_back({e.slab == last ? ""
-                        : e.slab < 0   ? "set-up"
-                                       : std::to_string(e.slab),
-                        std::string(kWireInfo[w].name), to_string(format),
-                        fmt::format("{:.9g}", to_real(e.event.raw, format)), std::to_string(e.event.raw),
-                        fmt::format("{:.9g}", e.event.exact / static_cast<double>(format.one())),
-                        fmt::format("{:+.3f}", static_cast<double>(e.event.raw) - e.event.exact)});
+        rows.push_back(
+            {e.slab == last ? ""
+             : e.slab < 0   ? "set-up"
+                            : std::to_string(e.slab),
+             std::string(kWireInfo[w].name), to_string(format),
+             fmt::format("{:.9g}", value_of(plan, e.event)), plan.real ? "-" : std::to_string(e.event.raw),
+             fmt::format("{:.9g}", e.event.exact / static_cast<double>(format.one())),
+             plan.real ? "-" : fmt::format("{:+.3f}", static_cast<double>(e.event.raw) - e.event.exact)});
         last = e.slab;
     }
     return rows.size() == 1 ? "" : table_text(rows) + "error: value less exact, in units of the last bit\n";
@@ -63,9 +71,9 @@ Json json_of_trace(const Plan& plan, const PixelArguments& a, const RayTrace& tr
             events.push_back({{"slab", e.slab},
                               {"wire", kWireInfo[static_cast<std::size_t>(e.event.wire)].name},
                               {"format", to_string(format)},
-                              {"raw", e.event.raw},
-                              {"value", to_real(e.event.raw, format)},
+                              {"value", value_of(plan, e.event)},
                               {"exact", e.event.exact / static_cast<double>(format.one())}});
+            if (!plan.real) events.back()["raw"] = e.event.raw;
         }
     return {{"schema", "squint.pixel/1"},
             {"version", version()},

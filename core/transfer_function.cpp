@@ -15,7 +15,6 @@
 namespace squint {
 namespace {
 
-constexpr int kDefaultEntries = 4096;
 constexpr int kMostEntries = 1 << 16;
 
 /// Piecewise linear between ascending points, constant outside; at a step the later point holds.  Remembers

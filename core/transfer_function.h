@@ -34,6 +34,9 @@ struct TransferFunction {
     double alpha_at(double value) const;
 };
 
+/// Entries where a scene does not say: one per level, at most so many.
+inline constexpr int kDefaultEntries = 4096;
+
 /// Every alpha but exactly 1 is capped here.
 inline constexpr double kLargestTranslucentAlpha = 1 - 1.0 / 4096;
 

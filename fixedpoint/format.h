@@ -10,7 +10,7 @@
 
 namespace squint {
 
-/// I integer bits, F fraction bits, and one more bit when signed.  I and F are 0 to 24 each, I + F >= 1.
+/// I integer bits, F fraction bits, and one more bit when signed.  I is 0 to 24, F 0 to 29, I + F >= 1.
 struct Format {
     int integer_bits = 1;
     int fraction_bits = 15;
@@ -25,7 +25,9 @@ struct Format {
     constexpr bool operator==(const Format&) const = default;
 };
 
-inline constexpr int kMostIntegerBits = 24, kMostFractionBits = 24;
+inline constexpr int kMostIntegerBits = 24, kMostFractionBits = 29;
+/// The most fraction bits that presets and tables choose by themselves where more were of no use.
+inline constexpr int kMostChosenFractionBits = 24;
 
 /// What happens to bits below the last one.  SystemC's SC_TRN, SC_TRN_ZERO, SC_RND, SC_RND_CONV.
 enum class Rounding : std::uint8_t {

@@ -328,10 +328,20 @@ template <class T>
 Real<T> shift_by(Real<T> x, Real<T> bits) {
     return {std::floor(x.v * power_of_two<T>(static_cast<int>(bits.v)))};
 }
+/// For traces: a wire's value without its rounding.
+template <class T>
+Real<T> traced(Real<T> value, const Rescale& to) {
+    if (to.statistics && to.statistics->trace) {
+        const double nearest = std::floor(static_cast<double>(value.v) + 0.5);
+        to.statistics->trace->push_back(
+            {to.wire, static_cast<double>(value.v), static_cast<std::int64_t>(nearest)});
+    }
+    return value;
+}
 template <class T>
 Real<T> quantise(Real<T> x, const Rescale& to) {
     const T scaled = x.v * power_of_two<T>(-to.shift);
-    if (!to.active) return {scaled};
+    if (!to.active) return traced(Real<T>{scaled}, to);
     // Exact for |scaled| < 2^52: the fraction of a double is a double.
     const T below = std::floor(scaled), rest = scaled - below;
     T rounded = below;

@@ -19,6 +19,7 @@
 #include "pipeline/plan/plan.h"
 #include "pipeline/stages/compositing-inl.h"
 #include "pipeline/stages/gradient-inl.h"
+#include "pipeline/stages/inside-inl.h"
 #include "pipeline/stages/interpolation-inl.h"
 #include "pipeline/stages/location-inl.h"
 #include "pipeline/stages/shading-inl.h"
@@ -61,7 +62,7 @@ struct FromVolume {
     }
 };
 
-/// MIP, MinIP, average: one scalar of what a ray has met so far and its next sample.
+/// MIP, MinIP, average: of a slab's two ends, or of what a ray has met so far and more of it.
 template <class W>
 HWY_INLINE W merge_samples(CompositingMode mode, W kept, W next) {
     return mode == CompositingMode::mip     ? max(kept, next)
@@ -69,14 +70,23 @@ HWY_INLINE W merge_samples(CompositingMode mode, W kept, W next) {
                                             : kept + next;
 }
 
-/// The end of a projection: the extreme or the sum of a ray's `slabs` samples is classified and composited as
-/// one.
+/// The trapezoid's mean along a ray, rounded once: every slab counts the mean of its ends, by its length.
+template <class W>
+HWY_INLINE W average_of(const Plan& plan, const ProjectedRay<W>& ray) {
+    const W full = constant<W>(std::int64_t{1} << plan.location.length_fraction);
+    const W last = divisor<W>(ray.last_length);
+    const W length = (ray.slabs - constant<W>(1)) * full + last;
+    return within(quotient(ray.kept * full + ray.last_ends * last, shift_left(length, 1), plan.to_average), 0,
+                  plan.input.highest);
+}
+
+/// The end of a projection: what stands for a ray is classified and composited as one slab.
 template <class W, class M, class Observer>
-Accumulated<W> projected(const Plan& plan, const M& method, W scalar, W slabs, Accumulated<W> pixel,
+Accumulated<W> projected(const Plan& plan, const M& method, const ProjectedRay<W>& ray, Accumulated<W> pixel,
                          Observer& observer) {
     observer.at(Part::classification);
-    if (plan.scene.compositing.mode == CompositingMode::average)
-        scalar = within(quotient(scalar, slabs, plan.to_average), 0, plan.input.highest);
+    const W scalar =
+        plan.scene.compositing.mode == CompositingMode::average ? average_of(plan, ray) : ray.kept;
     const Slab<W> slab =
         classify(method, scalar, scalar, constant<W>(std::int64_t{1} << plan.location.length_fraction));
     observer.at(Part::compositing);
@@ -123,7 +133,7 @@ class Slabs {
     }
 
     /// A projection's end.
-    void project(W scalar, W slabs) { pixel = projected(plan_, method_, scalar, slabs, pixel, observer_); }
+    void project(const ProjectedRay<W>& ray) { pixel = projected(plan_, method_, ray, pixel, observer_); }
 
   private:
     HWY_INLINE void take_samples(W k) {
@@ -139,37 +149,97 @@ class Slabs {
         }
         carries_ = true;
     }
-    HWY_INLINE const Sample<W>& back() const { return M::kNeedsBack ? back_ : front_; }
+    HWY_INLINE Sample<W>& back() { return M::kNeedsBack ? back_ : front_; }
 
     // Stages 4, 3 and 5, 6: one slab between two samples, or a part of one.
-    HWY_INLINE void composite_slab(const Sample<W>& front, const Sample<W>& back, W length) {
+    HWY_INLINE void composite_slab(Sample<W>& front, Sample<W>& back, W length) {
         observer_.at(Part::classification);
         Slab<W> slab = classify(method_, front.input, back.input, length);
-        if (plan_.lit && any(constant<W>(0) < slab.alpha)) light(front, back, slab);
+        if (plan_.lit && any(constant<W>(0) < slab.alpha)) light(front, back, length, slab);
         observer_.at(Part::compositing);
         const Accumulated<W> before = pixel;
         composite(plan_.compositing, pixel, slab.color, slab.alpha);
         observer_.composited(slab, before, pixel);
     }
 
-    // Stages 3 and 5: what is seen of a slab, lit.
-    HWY_INLINE void light(const Sample<W>& front, const Sample<W>& back, Slab<W>& slab) const {
-        const std::array<W, 3> normal = slab_normal(front, back);
-        observer_.lit(normal);
-        observer_.at(Part::shading);
-        shade(plan_.shading, ray_, normal, slab.alpha, slab.color);
-    }
-
-    // The normal that lights a slab: of its sample, or of the mean of its two ends' gradients.
-    HWY_INLINE std::array<W, 3> slab_normal(const Sample<W>& front, const Sample<W>& back) const {
-        std::array<W, 3> gradient = gradient_at(front);
-        if constexpr (M::kNeedsBack) {
-            const std::array<W, 3> other = gradient_at(back);
+    // Stages 3 and 5: what is seen of a slab, lit; by shading.inside with one normal or in pieces.
+    void light(Sample<W>& front, Sample<W>& back, W length, Slab<W>& slab) const {
+        const InsideStage& inside = plan_.inside;
+        if (inside.rule == InsideRule::front) return light_with(gradient_of(front), slab);
+        if (inside.rule == InsideRule::middle) return light_with(gradient_between(front, back, 1, 1), slab);
+        if (inside.rule == InsideRule::mean) {
+            std::array<W, 3> gradient = gradient_of(front);
+            const std::array<W, 3>& other = gradient_of(back);
             observer_.at(Part::gradient);
             for (std::size_t a = 0; a < 3; ++a) gradient[a] = gradient[a] + other[a];
+            return light_with(gradient, slab);
         }
+        const W zero = constant<W>(0);
+        W cuts = zero;
+        const auto worth_it = !(slab.alpha < constant<W>(inside.least_cut));
+        if (any(worth_it)) {
+            const std::array<W, 3>&at_front = gradient_of(front), &at_back = gradient_of(back);
+            observer_.at(Part::normal);
+            cuts = select(worth_it, cuts_between(at_front, at_back), zero);
+        }
+        Slab<W> whole = slab;
+        if (any(cuts == zero)) light_with(gradient_between(front, back, 1, 1), whole);
+        slab.color = whole.color;
+        for (int bits = 1; bits <= kMostCuts; ++bits) {
+            const auto so_many = cuts == constant<W>(bits);
+            if (!any(so_many)) continue;
+            const std::array<W, 3> color = light_in_pieces(front, back, length, bits);
+            for (std::size_t c = 0; c < 3; ++c) slab.color[c] = select(so_many, color[c], slab.color[c]);
+        }
+    }
+
+    // The straight colour of a slab of 2^bits lit pieces.
+    std::array<W, 3> light_in_pieces(const Sample<W>& front, const Sample<W>& back, W length,
+                                     int bits) const {
+        const InsideStage& inside = plan_.inside;
+        PieceLight<W> sum = no_piece<W>(inside);
+        W near = front.input, near_length = constant<W>(0);
+        bool seen = false;  // something of the slab
+        for (int i = 1; i <= 1 << bits; ++i) {
+            observer_.at(Part::classification);
+            const bool last = i == 1 << bits;
+            const W far = last ? back.input : input_between(inside, front.input, back.input, i, bits);
+            const W far_length = last ? length : length_up_to(inside, length, i, bits);
+            Slab<W> piece = classify(method_, near, far, far_length - near_length);
+            if (any(constant<W>(0) < piece.alpha)) {
+                light_with(gradient_between(front, back, 2 * i - 1, bits + 1), piece, !seen);
+                seen = true;
+                add_piece(inside, sum, piece.color, piece.alpha);
+            }
+            near = far, near_length = far_length;
+        }
+        observer_.at(Part::shading);
+        return color_of_pieces(inside, sum);
+    }
+
+    // Lights a slab, or a piece of one, by one raw gradient; the slab's normal is that of its first piece.
+    void light_with(const std::array<W, 3>& gradient, Slab<W>& slab, bool is_first = true) const {
         observer_.at(Part::normal);
-        return normalise(plan_.gradient, gradient);
+        const std::array<W, 3> normal = normalise(plan_.gradient, gradient);
+        const W certain = plan_.gradient.fades ? confidence(plan_.gradient, gradient) : constant<W>(0);
+        if (is_first) observer_.lit(normal);
+        observer_.at(Part::shading);
+        shade(plan_.shading, ray_, normal, slab.alpha, slab.color, certain);
+    }
+
+    // The raw gradient at an end, which two slabs share: computed once.
+    HWY_INLINE const std::array<W, 3>& gradient_of(Sample<W>& sample) const {
+        if (!sample.has_gradient) sample.gradient = gradient_at(sample), sample.has_gradient = true;
+        return sample.gradient;
+    }
+    // The raw gradient `part` 2^-bits of the way from one sample to another.
+    std::array<W, 3> gradient_between(const Sample<W>& front, const Sample<W>& back, int part,
+                                      int bits) const {
+        observer_.at(Part::location);
+        Sample<W> sample;
+        sample.location = location_between(plan_.inside, front.location, back.location, part, bits);
+        sample.position = position_of(sample.location);
+        return gradient_at(sample);
     }
 
     // Stage 2 at a location.
@@ -182,14 +252,18 @@ class Slabs {
     HWY_INLINE Sample<W> scalar_at(const std::array<W, 3>& location) const {
         Sample<W> sample;
         sample.location = location;
-        sample.position = cell_position(plan_.location, location);
-        // A part of a cell: what its meaning says and intervals do not see.
-        for (W& w : sample.position.weight)
-            w = within(w, 0, std::int64_t{1} << plan_.interpolation.weight_bits);
+        sample.position = position_of(location);
         observer_.at(Part::interpolation);
         sample.scalar =
             interpolate(plan_.interpolation, voxels_.cell(sample.position.cell), sample.position.weight);
         return sample;
+    }
+
+    HWY_INLINE CellPosition<W> position_of(const std::array<W, 3>& location) const {
+        CellPosition<W> position = cell_position(plan_.location, location);
+        // A part of a cell: what its meaning says and intervals do not see.
+        for (W& w : position.weight) w = within(w, 0, std::int64_t{1} << plan_.interpolation.weight_bits);
+        return position;
     }
 
     // Stage 3 at a sample: the raw gradient, per smallest voxel spacing.
@@ -241,11 +315,19 @@ void cast_ray(const Plan& plan, const M& method, const Voxels& voxels, const Ray
     pixel.samples = 0;
     if (plan.projection_mode) {
         if (count > 0) {
-            W scalar = slabs.sample(constant<W>(0)).input;
-            for (std::int64_t k = 1; k < count; ++k)
-                scalar =
-                    merge_samples(plan.scene.compositing.mode, scalar, slabs.sample(constant<W>(k)).input);
-            slabs.project(scalar, constant<W>(count));
+            const CompositingMode mode = plan.scene.compositing.mode;
+            const bool average = mode == CompositingMode::average;
+            W front = slabs.sample(constant<W>(0)).input;
+            ProjectedRay<W> all{average ? constant<W>(0) : front, constant<W>(0), constant<W>(count),
+                                ray.last_length};
+            for (std::int64_t k = 0; k < count; ++k) {
+                const W back = slabs.sample(constant<W>(k + 1)).input;
+                const W ends = merge_samples(mode, front, back);
+                W& to = average && k == count - 1 ? all.last_ends : all.kept;
+                to = merge_samples(mode, to, ends);
+                front = back;
+            }
+            slabs.project(all);
         }
         pixel.samples = count;
     } else {

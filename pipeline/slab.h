@@ -29,6 +29,18 @@ struct Sample {
     CellPosition<W> position;
     W scalar;  // sample
     W input;   // in table entries
+    // Stage 3, where a slab beside it was lit by it.
+    std::array<W, 3> gradient;
+    bool has_gradient = false;
+};
+
+/// MIP, MinIP, average: what stands for a ray of `slabs` slabs, one at least.
+template <class W>
+struct ProjectedRay {
+    W kept;       // MIP, MinIP: the extreme of all samples; average: the sum of both ends of every full slab
+    W last_ends;  // average: the sum of the last slab's ends
+    W slabs;
+    W last_length;  // of the last slab, in steps
 };
 
 /// What one ray leaves behind.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace squint {
 namespace {
@@ -14,7 +15,13 @@ constexpr Spec s(int i, int f, Rounding rounding) {
     return {{i, f, true}, rounding, Overflow::sat};
 }
 int clip(int bits) {
-    return std::clamp(bits, 0, kMostFractionBits);
+    return std::clamp(bits, 0, kMostChosenFractionBits);
+}
+// Fraction bits of a highlight above those that do for exponents up to 64: (N.H)^p errs by p times as much.
+int highlight_bits(const PresetInputs& in) {
+    int bits = 0;
+    while (std::ldexp(64.0, bits) < in.exponent) ++bits;
+    return bits;
 }
 
 // Squeeze, section 5, to the letter: what it does not name follows from its neighbours.
@@ -25,7 +32,7 @@ WireSpecs squeeze(const PresetInputs& in) {
     w[Wire::length] = u(1, 15, r);
     w[Wire::lerp_x] = w[Wire::lerp_y] = w[Wire::sample] = u(12, 12, r);
     w[Wire::gradient_lerp] = w[Wire::gradient] = s(12, 12, r), w[Wire::spacing] = u(1, 12, r),
-    w[Wire::normal] = s(1, 12, r);
+    w[Wire::normal] = s(1, 12, r), w[Wire::confidence] = u(1, 15, r);
     w[Wire::classification_input] = u(12, 0, r);
     w[Wire::table_color] = u(1, 15, r), w[Wire::table_alpha] = u(1, 15, r);
     w[Wire::table_extinction] = u(std::max(9, in.total_depth_bits), 15, r);
@@ -48,9 +55,9 @@ WireSpecs eight_bit(const PresetInputs& in) {
     w[Wire::classification_input] = u(in.entry_bits, 0, r);
     w[Wire::gradient_lerp] = w[Wire::gradient] = s(in.scalar_bits, 1, r), w[Wire::normal] = s(1, 7, r);
     w[Wire::table_color] = w[Wire::table_alpha] = u(0, 8, r);
-    for (const Wire wire :
-         {Wire::slab_ratio, Wire::slab_alpha, Wire::slab_color, Wire::contribution, Wire::color,
-          Wire::transparency, Wire::lit_color, Wire::intensity, Wire::material, Wire::power})
+    for (const Wire wire : {Wire::slab_ratio, Wire::slab_alpha, Wire::slab_color, Wire::contribution,
+                            Wire::color, Wire::transparency, Wire::lit_color, Wire::intensity, Wire::material,
+                            Wire::power, Wire::confidence})
         w[wire] = u(1, 8, r);
     w[Wire::light] = w[Wire::dot] = s(1, 8, r), w[Wire::slab_depth] = u(4, 8, r);
     return w;
@@ -68,17 +75,20 @@ WireSpecs standard(const PresetInputs& in) {
     const int scalar = in.scalar_bits, weight = scalar <= 12 ? 12 : 10;
     const int level = 31 - scalar - weight;  // fraction bits of a middle level: I + level + weight <= 31
     // Weak gradients want fraction bits; a difference of scalars, halved, has one bit less than they.
-    const int gradient = std::min(12, 32 - scalar - weight);
+    const int range = in.gradient_bits > 0 ? in.gradient_bits : scalar;
+    const int gradient = std::min(12, 32 - range - weight);
     const int sum = accumulating_bits(in);
+    const int sharp = highlight_bits(in);
     WireSpecs w{};
     w[Wire::location] = u(in.location_bits, clip(31 - in.location_bits), r);
     w[Wire::direction] = s(in.direction_bits, w[Wire::location].format.fraction_bits, r);
-    w[Wire::weight] = u(1, weight, up), w[Wire::length] = u(1, 9, r);
+    // 2^-10 of a step that is 1 deep is a quarter of an LSB8.
+    w[Wire::weight] = u(1, weight, up), w[Wire::length] = u(1, clip(9 + in.whole_depth_bits), r);
     w[Wire::lerp_x] = w[Wire::lerp_y] = u(scalar, level, up),
     w[Wire::sample] = u(scalar, std::min(12, 24 - scalar), up);
-    w[Wire::gradient_lerp] = w[Wire::gradient] = s(scalar, gradient, r), w[Wire::spacing] = u(1, 12, r);
-    w[Wire::normal] = s(1, 15, r);
-    w[Wire::classification_input] = u(in.entry_bits, 8, up);
+    w[Wire::gradient_lerp] = w[Wire::gradient] = s(range, gradient, r), w[Wire::spacing] = u(1, 12, r);
+    w[Wire::normal] = s(1, 15 + sharp, r), w[Wire::confidence] = u(1, 15, r);
+    w[Wire::classification_input] = u(in.entry_bits, clip(8 + in.entry_levels_bits), up);
     w[Wire::table_color] = u(1, 15, r), w[Wire::table_alpha] = u(1, sum, r);
     // One entry's depth times an input's 8 fraction bits fits 32, too, where the sums' 15 bits do.
     const int depth = sum > 15 ? sum + 1 : std::min(20, 23 - in.depth_bits);
@@ -89,8 +99,8 @@ WireSpecs standard(const PresetInputs& in) {
     const int deep = std::max(4, in.depth_bits);
     w[Wire::slab_depth] = u(deep, clip(std::max(sum + 7 - deep, sum + 1)), up);
     w[Wire::slab_ratio] = u(1, 15, up), w[Wire::slab_alpha] = w[Wire::slab_color] = u(1, sum, up);
-    w[Wire::light] = s(1, 14, r), w[Wire::dot] = s(1, 15, r), w[Wire::power] = u(1, 15, r),
-    w[Wire::material] = u(1, 14, r);
+    w[Wire::light] = s(1, 14 + sharp, r), w[Wire::dot] = s(1, 15 + sharp, r),
+    w[Wire::power] = u(1, 15 + sharp, r), w[Wire::material] = u(1, 14, r);
     w[Wire::intensity] = u(1, 14, r), w[Wire::lit_color] = u(1, sum, r);
     w[Wire::contribution] = w[Wire::color] = w[Wire::transparency] = u(1, sum, r);
     return w;
@@ -100,7 +110,7 @@ WireSpecs standard(const PresetInputs& in) {
 // ray).
 WireSpecs wide(const PresetInputs& in) {
     constexpr Rounding r = Rounding::rnd_conv;
-    const int f = std::clamp(9 + in.ray_bits + 2, 20, kMostFractionBits);
+    const int f = std::clamp(9 + in.ray_bits + 2, 20, kMostChosenFractionBits);
     WireSpecs w = standard(in);
     w[Wire::location] = u(in.location_bits, 24, r), w[Wire::direction] = s(in.direction_bits, 24, r),
     w[Wire::weight] = u(1, 20, r);
@@ -108,16 +118,18 @@ WireSpecs wide(const PresetInputs& in) {
     w[Wire::lerp_x] = w[Wire::lerp_y] = w[Wire::sample] =
         u(in.scalar_bits, std::min(20, 30 - in.scalar_bits), r);
     w[Wire::gradient_lerp] = w[Wire::gradient] = s(in.scalar_bits, 16, r), w[Wire::spacing] = u(1, 20, r),
-    w[Wire::normal] = s(1, 20, r);
-    w[Wire::classification_input] = u(in.entry_bits, std::min(18, 31 - in.entry_bits), r);
+    w[Wire::normal] = s(1, clip(20 + highlight_bits(in)), r), w[Wire::confidence] = u(1, 20, r);
+    w[Wire::classification_input] =
+        u(in.entry_bits, clip(std::min(18 + in.entry_levels_bits, 31 - in.entry_bits)), r);
     w[Wire::table_extinction] = w[Wire::table_moment] = u(in.total_depth_bits, 24, r),
     w[Wire::slab_depth] = u(std::max(5, in.depth_bits), 24, r);
     for (const Wire wire :
          {Wire::table_color, Wire::table_alpha, Wire::slab_ratio, Wire::slab_alpha, Wire::slab_color,
           Wire::lit_color, Wire::contribution, Wire::color, Wire::transparency})
         w[wire] = u(1, f, r);
-    w[Wire::light] = w[Wire::dot] = s(1, 20, r);
-    w[Wire::power] = w[Wire::material] = w[Wire::intensity] = u(1, 20, r);
+    w[Wire::light] = w[Wire::dot] = s(1, clip(20 + highlight_bits(in)), r);
+    w[Wire::power] = u(1, clip(20 + highlight_bits(in)), r);
+    w[Wire::material] = w[Wire::intensity] = u(1, 20, r);
     return w;
 }
 
@@ -130,8 +142,8 @@ const std::vector<std::string>& preset_names() {
 
 int accumulating_bits(const PresetInputs& in) {
     constexpr int kOfThirtyTwoBits = 15;  // two factors of u1.15 and a sign
-    if (in.step >= 0.5 && in.ray_bits <= 12) return kOfThirtyTwoBits;
-    return std::clamp(9 + in.ray_bits, kOfThirtyTwoBits, kMostFractionBits);
+    if (in.step >= 0.5 && in.ray_bits <= 12 && !in.faint) return kOfThirtyTwoBits;
+    return std::clamp(9 + in.ray_bits, kOfThirtyTwoBits, kMostChosenFractionBits);
 }
 
 bool rounds_nothing(std::string_view preset) {

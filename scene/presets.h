@@ -21,13 +21,20 @@ struct PresetInputs {
     int depth_bits = 4;         // I of the optical depth of one slab
     int total_depth_bits = 12;  // I of the prefix sum of all entries' optical depths, and of any one of them
     double step = 1;            // slab length in voxels
+    // What few scenes ask for: without it the formats are those of all others.
+    bool faint = false;         // even matter so faint that 15 bits lose it along a ray
+    int whole_depth_bits = 0;   // I of the optical depth of one slab where that is 1 or more
+    int entry_levels_bits = 0;  // log2 of the levels an entry stands for, rounded up
+    int gradient_bits = 0;      // I of the data's range where that is less than the scalar's, else 0
+    double exponent = 1;        // of the highlight; 1 where none is lit
 };
 
 const std::vector<std::string>& preset_names();
 
 /// Fraction bits that `default` gives what adds up along a ray (opacities, T, C, prefix sums).  15, which
-/// 32-bit words multiply, at steps of half a voxel or more and up to 4096 samples; beyond, 9 + log2(samples),
-/// which keeps half a last bit at every sample below half an LSB8 of the picture (docs/math.md#b5 and #c6).
+/// 32-bit words multiply, at steps of half a voxel or more and up to 4096 samples; beyond, and where even
+/// matter is faint, 9 + log2(samples), which keeps half a last bit at every sample below half an LSB8 of the
+/// picture (docs/math.md#b5 and #c6).
 int accumulating_bits(const PresetInputs& inputs);
 
 /// The presets that round no wire: `real` in double, `float32` in float.

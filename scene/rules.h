@@ -60,7 +60,8 @@ std::string allowed_text(std::string_view key) {
             return listed(words) + (key == "precision.preset" ? ", or the path of a preset file" : "");
         if (key == "volume.file" || key == "transfer_function.file") return "a path in quotes";
         if (key.starts_with("precision."))
-            return "a format (I and F of 0 to 24, not both 0), a rounding (trn, trn_zero, rnd, rnd_conv) and "
+            return "a format (I of 0 to 24, F of 0 to 29, not both 0), a rounding (trn, trn_zero, rnd, "
+                   "rnd_conv) and "
                    "an overflow rule (sat, wrap), as "
                    "in \"u1.15 trn sat\"; "
                    "parts may be left out";
@@ -72,8 +73,10 @@ std::string allowed_text(std::string_view key) {
     } else if constexpr (std::is_integral_v<T>) {
         return "a whole number" + limits;
     } else if constexpr (std::is_same_v<T, Vec3>) {
-        return (key.ends_with("color") || key.ends_with("background") ? "three numbers [r, g, b]"
-                                                                      : "three numbers [x, y, z]") +
+        return (key.ends_with("color") || key.ends_with("background") || key.ends_with("cool") ||
+                        key.ends_with("warm")
+                    ? "three numbers [r, g, b]"
+                    : "three numbers [x, y, z]") +
                limits;
     } else if constexpr (std::is_same_v<T, ValueRange>) {
         return "two numbers, the first below the second, \"data\", or [] for none";

@@ -24,9 +24,21 @@ enum class GradientRule { central, central_samples, analytic, sobel };
 enum class Method { pc, pc_mid, pi2d, pi2d_no_attenuation, pi1d, pi1d_engel, pips, leg };
 enum class TableLookup { bilinear, nearest };
 enum class AlphaEncoding { alpha, sqrt_alpha };  // how the table stores opacity, in the format of table_alpha
-enum class ShadingModel { none, phong, blinn_phong };
+enum class ShadingModel { none, phong, blinn_phong, cone, gooch };
+enum class ConeSlope { energy, paper };
+enum class CoolSide { shadow, light };
+enum class InsideRule { mean, front, middle, adaptive };  // where inside a slab its light is taken
 enum class PowerRule { squaring, parabola, table };
-enum class CompositingForm { automatic, w, equation_9, alpha, back_to_front, unit255_shift, unit255_blinn };
+enum class CompositingForm {
+    automatic,
+    w,
+    w_carry,
+    equation_9,
+    alpha,
+    back_to_front,
+    unit255_shift,
+    unit255_blinn
+};
 enum class CompositingMode { over, mip, minip, average };
 enum class LayoutRule { automatic, linear, cells };
 
@@ -45,9 +57,12 @@ SQUINT_NAMES(GradientRule, "central", "central_samples", "analytic", "sobel");
 SQUINT_NAMES(Method, "pc", "pc_mid", "pi2d", "pi2d_no_attenuation", "pi1d", "pi1d_engel", "pips", "leg");
 SQUINT_NAMES(TableLookup, "bilinear", "nearest");
 SQUINT_NAMES(AlphaEncoding, "alpha", "sqrt_alpha");
-SQUINT_NAMES(ShadingModel, "none", "phong", "blinn_phong");
+SQUINT_NAMES(ShadingModel, "none", "phong", "blinn_phong", "cone", "gooch");
+SQUINT_NAMES(ConeSlope, "energy", "paper");
+SQUINT_NAMES(CoolSide, "shadow", "light");
+SQUINT_NAMES(InsideRule, "mean", "front", "middle", "adaptive");
 SQUINT_NAMES(PowerRule, "squaring", "parabola", "table");
-SQUINT_NAMES(CompositingForm, "auto", "w", "equation_9", "alpha", "back_to_front", "unit255_shift",
+SQUINT_NAMES(CompositingForm, "auto", "w", "w_carry", "equation_9", "alpha", "back_to_front", "unit255_shift",
              "unit255_blinn");
 SQUINT_NAMES(CompositingMode, "over", "mip", "minip", "average");
 SQUINT_NAMES(LayoutRule, "auto", "linear", "cells");
@@ -107,6 +122,12 @@ struct ShadingSettings {
     double exponent = 32;
     PowerRule power = PowerRule::squaring;
     bool two_sided = false;
+    double gradient_floor = 0;  // levels per smallest voxel spacing; 0: light does not fade in
+    std::optional<InsideRule> inside = std::nullopt;  // absent: the best that the method has
+    ConeSlope cone_slope = ConeSlope::energy;
+    CoolSide cool_side = CoolSide::shadow;
+    Vec3 cool{0, 0, 0.55}, warm{0.3, 0.3, 0};   // gooch: Gooch et al. 1998, as its own colours
+    double cool_share = 0.2, warm_share = 0.6;  // and how much of the matter's
 };
 
 struct ClassificationSettings {
@@ -229,7 +250,8 @@ void visit_scene(S& scene, V&& visit) {
     visit("clip.low", scene.clip.low, "corner of the box kept, world units");
     visit("clip.high", scene.clip.high, "opposite corner");
     auto& shading = scene.shading;
-    visit("shading.model", shading.model, "none, phong or blinn_phong; absent where there is no light");
+    visit("shading.model", shading.model,
+          "none, phong, blinn_phong, cone or gooch; absent where there is no light");
     visit("shading.gradient", shading.gradient, "central, central_samples, analytic or sobel");
     visit("shading.ka", shading.ka, "ambient weight");
     visit("shading.kd", shading.kd, "diffuse weight");
@@ -237,6 +259,21 @@ void visit_scene(S& scene, V&& visit) {
     visit("shading.exponent", shading.exponent, "specular exponent; a power of two for squaring");
     visit("shading.power", shading.power, "squaring, parabola or table");
     visit("shading.two_sided", shading.two_sided, "light both sides of a surface");
+    visit("shading.gradient_floor", shading.gradient_floor,
+          "light counts by the length of the gradient over this, at most 1, in levels per smallest voxel "
+          "spacing; 0: always "
+          "in full");
+    visit(
+        "shading.inside", shading.inside,
+        "where inside a slab its light is taken: mean of the ends' gradients, front, middle, adaptive (1, 2 "
+        "or 4 pieces as it turns); default: mean; pc and pc_mid have one sample");
+    visit("shading.cone_slope", shading.cone_slope, "cone: energy, (n + 1) / 2 of exponent n, or paper, n");
+    visit("shading.cool_side", shading.cool_side, "gooch: what turns cool, shadow or light (as printed)");
+    visit("shading.cool", shading.cool, "gooch: colour of the cool side");
+    visit("shading.warm", shading.warm, "gooch: colour of the warm side");
+    visit("shading.cool_share", shading.cool_share,
+          "gooch: what the cool side has of kd times the matter's colour");
+    visit("shading.warm_share", shading.warm_share, "gooch: what the warm side has of it");
     auto& classification = scene.classification;
     visit("classification.method", classification.method,
           "pc, pc_mid, pi2d, pi2d_no_attenuation, pi1d, pi1d_engel, pips or leg");
@@ -250,9 +287,8 @@ void visit_scene(S& scene, V&& visit) {
           "find opaque values inside a slab");
     visit("compositing.mode", scene.compositing.mode, "over, mip, minip or average");
     visit("compositing.form", scene.compositing.form,
-          "w, equation_9, alpha, back_to_front, unit255_shift or unit255_blinn; auto: w, but equation_9 for "
-          "the preset "
-          "squeeze and unit255_shift for eight_bit");
+          "w, w_carry (remainders carried on), equation_9, alpha, back_to_front, unit255_shift or "
+          "unit255_blinn; auto: w, but equation_9 for the preset squeeze and unit255_shift for eight_bit");
     visit("output.depth", scene.output.depth, "channels Z and Z.mean");
     visit("output.normals", scene.output.normals, "channels N.x N.y N.z");
     visit("output.samples", scene.output.samples, "channel samples");

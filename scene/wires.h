@@ -21,6 +21,7 @@ enum class Wire : int {
     gradient,              //    raw gradient, levels per smallest voxel spacing
     spacing,               //    smallest voxel spacing over the axis's own
     normal,                //    normalised gradient
+    confidence,            //    min(1, |gradient| / shading.gradient_floor)
     classification_input,  // 4  the scalar in table entries
     table_color,           //    colours of the entries
     table_alpha,           //    opacities of the entries for one full step
@@ -59,6 +60,7 @@ inline constexpr std::array<WireInfo, kWires> kWireInfo{{
     {"gradient", "gradient", "raw gradient, levels per smallest spacing"},
     {"spacing", "gradient", "smallest spacing over the axis's own"},
     {"normal", "gradient", "normalised gradient"},
+    {"confidence", "gradient", "length of a gradient over shading.gradient_floor, 1 at most"},
     {"classification_input", "classification", "scalar in table entries"},
     {"table_color", "classification", "colours of the entries"},
     {"table_alpha", "classification", "opacities of the entries"},

@@ -117,7 +117,7 @@ Vec3 lit_emission(const Piece& piece, const Reflect& reflect, double allowed) {
         piece,
         [&](double q) {
             const Reflection light = reflect(q);
-            return (piece.color_at(q) * light.diffuse + light.specular) *
+            return light.of(piece.color_at(q)) *
                    (piece.extinction_at(q) * piece.length * attenuation(piece.depth_at(q)));
         },
         largest, 0, 1, allowed);
@@ -149,6 +149,7 @@ class RayIntegral {
     std::array<double, 4> pixel() const { return {color_.x, color_.y, color_.z, 1 - clear_}; }
 
   private:
+    bool add_field(const Passage& passage, const Cubic& scalar);
     bool add_monotone(double from, double to);
     void add_piece(double from, double to, const Stretch& stretch);
     void end_at(double r, double coordinate);
@@ -175,7 +176,7 @@ void RayIntegral::end_at(double r, double coordinate) {
     Vec3 color = matter_.color_at(coordinate);
     if (light_) {
         const Reflection light = reflection_at(r);
-        color = color * light.diffuse + light.specular;
+        color = light.of(color);
     }
     color_ += color * clear_;
     clear_ = 0;
@@ -222,8 +223,20 @@ bool RayIntegral::add(const Passage& passage, const Corners& corners) {
     const double per_entry = plan_.entries.scalars_per_entry;
     const auto [least, greatest] = std::minmax_element(corners.begin(), corners.end());
     if (!matter_.visible(*least / per_entry, *greatest / per_entry)) return true;
-    coordinate_ = along(corners, passage);
-    for (double& c : coordinate_.c) c /= per_entry;
+    if (plan_.scene.sampling.interpolation != InterpolationRule::nearest)
+        return add_field(passage, along(corners, passage));
+    const NearestParts parts = nearest_along(corners, passage);
+    for (int i = 0; i < parts.count; ++i) {
+        const NearestPart& part = parts.part[static_cast<std::size_t>(i)];
+        if (!add_field(part.passage, {{part.scalar}})) return false;
+    }
+    return true;
+}
+
+/// A stretch of the ray along which the field is a cubic.
+bool RayIntegral::add_field(const Passage& passage, const Cubic& scalar) {
+    coordinate_ = scalar;
+    for (double& c : coordinate_.c) c /= plan_.entries.scalars_per_entry;
     length_ = passage.length;
     if (light_) gradient_ = gradient_along(*plan_.volume, plan_.scene.shading.gradient, passage);
     if (matter_.opaque_at(coordinate_.at(0))) {
@@ -245,13 +258,24 @@ double projected(const Plan& plan, CellWalk& walk, double chord) {
     const CompositingMode mode = plan.scene.compositing.mode;
     const double sign = mode == CompositingMode::minip ? -1 : 1;
     double greatest = -INFINITY, sum = 0;
-    for (Passage passage; walk.next(passage);) {
-        const Cubic field = along(corners_of(*plan.volume, passage.cell), passage);
-        sum += passage.length * (field.c[0] + field.c[1] / 2 + field.c[2] / 3 + field.c[3] / 4);
+    const auto add = [&](const Cubic& field, double length) {
+        sum += length * (field.c[0] + field.c[1] / 2 + field.c[2] / 3 + field.c[3] / 4);
         greatest = std::max({greatest, sign * field.at(0), sign * field.at(1)});
         const Turns turns = turns_of(field);
         for (int i = 0; i < turns.count; ++i)
             greatest = std::max(greatest, sign * field.at(turns.at[static_cast<std::size_t>(i)]));
+    };
+    for (Passage passage; walk.next(passage);) {
+        const Corners corners = corners_of(*plan.volume, passage.cell);
+        if (plan.scene.sampling.interpolation != InterpolationRule::nearest) {
+            add(along(corners, passage), passage.length);
+            continue;
+        }
+        const NearestParts parts = nearest_along(corners, passage);
+        for (int i = 0; i < parts.count; ++i) {
+            const NearestPart& part = parts.part[static_cast<std::size_t>(i)];
+            add({{part.scalar}}, part.passage.length);
+        }
     }
     const double scalar = mode == CompositingMode::average ? sum / chord : sign * greatest;
     return std::clamp(scalar / plan.entries.scalars_per_entry, 0.0, plan.entries.size() - 1.0);
@@ -312,7 +336,7 @@ std::array<double, 4> Reference::pixel(int column, int row) const {
         const Vec3 color = matter_.color_at(at) * alpha;
         return {color.x, color.y, color.z, alpha};
     }
-    const RayLight light(plan_.scene, plan_.camera, ray.direction);
+    const RayLight light(plan_.scene, *plan_.volume, plan_.camera, ray.direction);
     RayIntegral integral(plan_, matter_, plan_.lit ? &light : nullptr, tolerance_ / 2 / chord);
     for (Passage passage; walk.next(passage);)
         if (!integral.add(passage, corners_of(*plan_.volume, passage.cell))) break;

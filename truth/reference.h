@@ -3,9 +3,9 @@
 //
 // Inside a cell the field is a cubic polynomial of the distance.  Each of its monotone parts is cut where it
 // meets an entry; between cuts extinction and colour are linear in the field, the optical depth is a quartic,
-// and what is left to quadrature is one smooth integral.  What of a scene it does not know: step, methods,
-// formats, nearest interpolation (the field is trilinear) and the scene's early termination (a ray ends where
-// T < 1e-12).
+// and what is left to quadrature is one smooth integral.  The nearest field is constant between jumps half-way
+// from voxel to voxel, where passages are cut.  What of a scene it does not know: step, methods, formats and
+// the scene's early termination (a ray ends where T < 1e-12).
 #pragma once
 
 #include "core/image.h"

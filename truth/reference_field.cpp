@@ -74,6 +74,30 @@ Cubic along(const Corners& v, const Passage& passage) {
     return {{p0 + z * q0, p1 + z * q1 + d.z * q0, p2 + z * q2 + d.z * q1, d.z * q2}};
 }
 
+NearestParts nearest_along(const Corners& corners, const Passage& passage) {
+    const Vec3 way = passage.to - passage.from;
+    std::array<double, 5> cut{0, 1, 1, 1, 1};
+    for (int a = 0; a < 3; ++a) {
+        const double r = (0.5 - passage.from[a]) / way[a];
+        if (r > 0 && r < 1) cut[static_cast<std::size_t>(a) + 1] = r;
+    }
+    std::sort(cut.begin(), cut.end());
+    NearestParts parts;
+    for (std::size_t i = 0; i < 4; ++i) {
+        if (!(cut[i] < cut[i + 1])) continue;
+        NearestPart& part = parts.part[static_cast<std::size_t>(parts.count++)];
+        part.passage = passage;
+        part.passage.from = passage.from + way * cut[i];
+        part.passage.to = passage.from + way * cut[i + 1];
+        part.passage.first = passage.first + passage.length * cut[i];
+        part.passage.length = passage.length * (cut[i + 1] - cut[i]);
+        const Vec3 middle = passage.from + way * ((cut[i] + cut[i + 1]) / 2);
+        part.scalar = corners[static_cast<std::size_t>((middle.x >= 0.5) + 2 * (middle.y >= 0.5) +
+                                                       4 * (middle.z >= 0.5))];
+    }
+    return parts;
+}
+
 Corners corners_of(const Volume& volume, const Index3& cell) {
     const std::int64_t x1 = std::min(cell.x + 1, volume.dims.x - 1),
                        y1 = std::min(cell.y + 1, volume.dims.y - 1),
@@ -86,8 +110,11 @@ Corners corners_of(const Volume& volume, const Index3& cell) {
 }
 
 std::array<Cubic, 3> gradient_along(const Volume& volume, GradientRule rule, const Passage& passage) {
+    // Differences are once, twice or 32 times the gradient.
+    const double differences = rule == GradientRule::analytic ? 1 : rule == GradientRule::sobel ? 32 : 2;
     std::array<Cubic, 3> gradient;
     for (int axis = 0; axis < 3; ++axis) {
+        const double per_spacing = volume.smallest_spacing() / (volume.spacing[axis] * differences);
         Corners difference;
         for (int i = 0; i < 8; ++i) {
             Index3 p = passage.cell + Index3(i & 1, i >> 1 & 1, i >> 2);
@@ -101,7 +128,7 @@ std::array<Cubic, 3> gradient_along(const Volume& volume, GradientRule rule, con
                 here = rule == GradientRule::sobel ? sobel_difference(volume, p, axis)
                                                    : central_difference(volume, p, axis);
             }
-            here /= volume.spacing[axis];
+            here *= per_spacing;
         }
         gradient[static_cast<std::size_t>(axis)] = along(difference, passage);
     }

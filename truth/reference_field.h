@@ -42,12 +42,24 @@ using Corners = std::array<double, 8>;
 /// The trilinear interpolant of `corners` along a passage.
 Cubic along(const Corners& corners, const Passage& passage);
 
+/// A part of a passage nearest to one voxel.
+struct NearestPart {
+    Passage passage;
+    double scalar = 0;
+};
+/// A passage cut where the nearest voxel changes: half-way between voxels, where the upper one begins.
+struct NearestParts {
+    int count = 0;
+    std::array<NearestPart, 4> part{};
+};
+NearestParts nearest_along(const Corners& corners, const Passage& passage);
+
 /// Scalars at the corners of a cell; an axis of one voxel repeats it.
 Corners corners_of(const Volume& volume, const Index3& cell);
 
-/// The gradient along a passage, up to one common factor, in world space.  The rules of docs/conventions.md, all
-/// trilinear in the cell: differences of samples one voxel apart, clamped to the box, are the interpolated
-/// differences of the voxels.
+/// The gradient along a passage, in levels per smallest voxel spacing, in world space.  The rules of
+/// docs/conventions.md, all trilinear in the cell: differences of samples one voxel apart, clamped to the box, are
+/// the interpolated differences of the voxels.
 std::array<Cubic, 3> gradient_along(const Volume& volume, GradientRule rule, const Passage& passage);
 
 /// Blocks of 4 x 4 x 4 cells and whether a ray has to look into them.

@@ -15,12 +15,19 @@ double unit_clamped(double x) {
 }  // namespace
 
 Power::Power(const ShadingSettings& settings)
-    : parabola_(settings.power == PowerRule::parabola), exponent_(settings.exponent) {
-    for (; !parabola_ && exponent_ > 1 && std::fmod(exponent_, 2) == 0; exponent_ /= 2) ++squarings_;
+    : cone_(settings.power == PowerRule::parabola || settings.model == ShadingModel::cone),
+      slope_((settings.exponent + 1) / 2),
+      exponent_(settings.exponent) {
+    if (settings.model == ShadingModel::cone && settings.cone_slope == ConeSlope::paper)
+        slope_ = settings.exponent;
+    for (; !cone_ && exponent_ > 1 && std::fmod(exponent_, 2) == 0; exponent_ /= 2) ++squarings_;
 }
 
-RayLight::RayLight(const Scene& scene, const Camera& camera, const Vec3& ray_direction)
-    : settings_(&scene.shading), power_(scene.shading), eye_(-ray_direction) {
+RayLight::RayLight(const Scene& scene, const Volume& volume, const Camera& camera, const Vec3& ray_direction)
+    : settings_(&scene.shading),
+      power_(scene.shading),
+      shortest_(0x1p-40 * static_cast<double>(volume.largest - volume.smallest)),
+      eye_(-ray_direction) {
     for (const Light& light : scene.lights) {
         const Vec3 towards = light.headlight ? -camera.view : light.direction.normalized();
         white_ = white_ && light.color == Vec3(1);
@@ -28,11 +35,22 @@ RayLight::RayLight(const Scene& scene, const Camera& camera, const Vec3& ray_dir
     }
 }
 
+// C = (a kd c + cool) (1 - N.L) / 2 + (b kd c + warm) (1 + N.L) / 2, or with the sides exchanged (Guetat et
+// al. 2010, equation 11, with the part that does not depend on N.L).
+Reflection RayLight::tone(double facing) const {
+    const ShadingSettings& s = *settings_;
+    const double side = s.cool_side == CoolSide::shadow ? facing : -facing;
+    const double warm = (1 + side) / 2, cool = (1 - side) / 2;
+    return {Vec3(s.kd * (s.cool_share * cool + s.warm_share * warm)), s.cool * cool + s.warm * warm, true};
+}
+
 Reflection RayLight::operator()(const Vec3& gradient) const {
     const ShadingSettings& s = *settings_;
     Vec3 diffuse{0, 0, 0}, specular{0, 0, 0};
     const double length = std::sqrt(gradient.dot(gradient));
-    if (length > 0) {
+    const double certain = s.gradient_floor > 0 ? std::min(1.0, length / s.gradient_floor) : 1;
+    double facings = 0;
+    if (length > shortest_) {
         const Vec3 normal = gradient * (-1 / length);
         for (std::size_t l = 0; l < lamps_; ++l) {
             const Lamp& lamp = lamp_[l];
@@ -45,12 +63,14 @@ Reflection RayLight::operator()(const Vec3& gradient) const {
                 highlight = std::abs(highlight);
             }
             if (s.two_sided) facing = std::abs(facing);
+            facings += facing;
             diffuse += lamp.color * unit_clamped(facing);
             specular += lamp.color * power_(unit_clamped(highlight));
         }
     }
-    const auto lit = [&](double sum) { return unit_clamped(s.ka + s.kd * unit_clamped(sum)); };
-    const auto shine = [&](double sum) { return s.ks * unit_clamped(sum); };
+    if (s.model == ShadingModel::gooch) return tone(std::clamp(facings, -1.0, 1.0) * certain);
+    const auto lit = [&](double sum) { return unit_clamped(s.ka + s.kd * certain * unit_clamped(sum)); };
+    const auto shine = [&](double sum) { return s.ks * certain * unit_clamped(sum); };
     if (white_) return {Vec3(lit(diffuse.x)), Vec3(shine(specular.x))};
     return {Vec3(lit(diffuse.x), lit(diffuse.y), lit(diffuse.z)),
             Vec3(shine(specular.x), shine(specular.y), shine(specular.z))};

@@ -3,6 +3,7 @@
 
 #include "core/camera.h"
 #include "core/portable_math.h"
+#include "core/volume.h"
 #include "scene/scene.h"
 
 #include <algorithm>
@@ -13,20 +14,28 @@ namespace squint::reference {
 /// What a gradient makes of the light: matter of colour c shines with c * diffuse + specular.
 struct Reflection {
     Vec3 diffuse{1, 1, 1}, specular{0, 0, 0};
+    bool held_to_one = false;  // each channel of it
+
+    Vec3 of(const Vec3& color) const {
+        Vec3 light = color * diffuse + specular;
+        for (int c = 0; held_to_one && c < 3; ++c) light[c] = std::min(light[c], 1.0);
+        return light;
+    }
 };
 
-/// x^p, or the parabola in its place, for x in [0, 1].
+/// x^p, or a cone in its place (a parabola in the angle), for x in [0, 1].
 class Power {
   public:
     explicit Power(const ShadingSettings& settings);
     double operator()(double x) const {
-        if (parabola_) return std::max(0.0, 1 - (exponent_ + 1) / 2 * (1 - x));
+        if (cone_) return std::max(0.0, 1 - slope_ * (1 - x));
         for (int i = 0; i < squarings_; ++i) x *= x;
         return exponent_ == 1 ? x : portable::pow(x, exponent_);
     }
 
   private:
-    bool parabola_;
+    bool cone_;
+    double slope_;
     int squarings_ = 0;  // x^p = (x^(2^squarings))^exponent
     double exponent_;
 };
@@ -34,17 +43,22 @@ class Power {
 /// The lights as one ray meets them.
 class RayLight {
   public:
-    RayLight(const Scene& scene, const Camera& camera, const Vec3& ray_direction);
-    /// `gradient` in world space, of any length.  A zero gradient gets ambient light only.
+    RayLight(const Scene& scene, const Volume& volume, const Camera& camera, const Vec3& ray_direction);
+    /// `gradient` in world space, in levels per smallest voxel spacing.  A zero gradient gets ambient light
+    /// only, and one below 2^-40 of the data's range is zero: a rounding has a direction, too.
     Reflection operator()(const Vec3& gradient) const;
 
   private:
     struct Lamp {
         Vec3 towards, half, color;
     };
+    /// Shading.model gooch: between the warm and the cool side.
+    Reflection tone(double facing) const;
+
     const ShadingSettings* settings_;
     Power power_;
-    Vec3 eye_;  // towards it
+    double shortest_;  // of a gradient
+    Vec3 eye_;         // towards it
     std::array<Lamp, kMostLights> lamp_;
     std::size_t lamps_ = 0;
     bool white_ = true;  // every lamp is

@@ -13,6 +13,8 @@
 
 #include <hwy/highway.h>
 
+#include <type_traits>
+
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
@@ -75,6 +77,16 @@ HWY_INLINE EntryPosition<W> entry_position(const EntrySpacing& e, W input) {
     return {entry, within(min(input - shift_left(entry, e.input_fraction), constant<W>(one)), 0, one)};
 }
 
+/// Where an input stands between two of 2^bits rows an entry.
+template <class W>
+HWY_INLINE EntryPosition<W> sub_entry_position(const EntrySpacing& e, int sub_entry_bits, W input) {
+    const int bits = e.input_fraction - sub_entry_bits;
+    const std::int64_t last = (static_cast<std::int64_t>(e.last_segment + 1) << sub_entry_bits) - 1;
+    const W entry = min(floor_shift(input, bits), constant<W>(last));
+    const std::int64_t one = std::int64_t{1} << bits;
+    return {entry, within(min(input - shift_left(entry, bits), constant<W>(one)), 0, one)};
+}
+
 /// One where a position is opaque: on an opaque entry, or between two (docs/conventions.md).
 template <class W>
 HWY_INLINE auto is_opaque(const EntryLookup& e, const EntryPosition<W>& at) {
@@ -87,28 +99,49 @@ HWY_INLINE auto is_opaque(const EntryLookup& e, const EntryPosition<W>& at) {
            ((at.fraction == one) & (zero < next_bit));
 }
 
+/// A full step's depth times the length of a slab, exact, then rounded once.
+template <class W>
+HWY_INLINE W shortened(W depth, W length, int length_fraction, const Rescale& to_shorter) {
+    return quotient(wide_product(depth, length), widen(constant<W>(std::int64_t{1} << length_fraction)),
+                    to_shorter);
+}
+/// The optical depth of a point, extinction linear between entries, over `length` steps.
+template <class W>
+HWY_INLINE W point_depth(const EntryLookup& e, const EntryPosition<W>& at, W length) {
+    const W next = gather(e.matter, at.entry + constant<W>(1), EntryLookup::extinction);
+    const W full = quantise(
+        blend(gather(e.matter, at.entry, EntryLookup::extinction), next, at.fraction, e.input_fraction),
+        e.to_depth);
+    return shortened(full, length, e.length_fraction, e.to_shorter);
+}
+
 /// The function at one point, for a slab of `length` steps (post-classification; every method where both ends
 /// are equal).
 template <class W>
 HWY_INLINE Slab<W> classify_point(const EntryLookup& e, W input, W length) {
-    const EntryPosition<W> at = entry_position(e, input);
+    const EntryPosition<W> row = sub_entry_position(e, e.row_bits, input);
     const W full = constant<W>(std::int64_t{1} << e.length_fraction);
     Slab<W> slab;
     const std::array<W, 4> between =
-        lerp_rows(e.table, at.entry, at.fraction, e.input_fraction, e.to_color, e.to_alpha);
+        lerp_rows(e.table, row.entry, row.fraction, e.input_fraction - e.row_bits, e.to_color, e.to_alpha);
     slab.color = {between[0], between[1], between[2]};
     slab.alpha = between[EntryLookup::alpha];
     const bool may_be_opaque = e.has_opaque && any(!(slab.alpha < constant<W>(e.least_opaque)));
     const auto shorter = length < full;
     if (any(shorter)) {
-        const W next = gather(e.matter, at.entry + constant<W>(1), EntryLookup::extinction);
-        const W full_depth = quantise(
-            blend(gather(e.matter, at.entry, EntryLookup::extinction), next, at.fraction, e.input_fraction),
-            e.to_depth);
-        const W depth = quantise(full_depth * length, e.to_shorter);
+        const W depth = point_depth(e, entry_position(e, input), length);
         slab.alpha = select(shorter, opacity_of_depth(e.opacity, depth), slab.alpha);
     }
-    if (may_be_opaque) slab.alpha = select(is_opaque(e, at), constant<W>(e.one_alpha), slab.alpha);
+    if (may_be_opaque)
+        slab.alpha = select(is_opaque(e, entry_position(e, input)), constant<W>(e.one_alpha), slab.alpha);
+    if constexpr (std::is_same_v<W, Real<double>>) {
+        // Without rounding: the exact opacity, not a table's rows.
+        if (!e.table.active) {
+            const EntryPosition<W> at = entry_position(e, input);
+            slab.alpha = opacity_of_depth(e.opacity, point_depth(e, at, length));
+            if (e.has_opaque) slab.alpha = select(is_opaque(e, at), constant<W>(e.one_alpha), slab.alpha);
+        }
+    }
     return slab;
 }
 

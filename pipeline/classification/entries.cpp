@@ -72,7 +72,7 @@ OpacityUnit computed_opacity_unit(const WireSpecs& specs) {
     const double deepest =
         std::min(std::ldexp(1.0, depth.format.integer_bits), 0.6932 * (alpha.format.fraction_bits + 2));
     const int rows = static_cast<int>(std::ceil(std::ldexp(deepest, unit.row_bits))) + 2;
-    const int fraction = std::min(alpha.format.fraction_bits + 2, kMostFractionBits);
+    const int fraction = std::min(alpha.format.fraction_bits + 2, kMostChosenFractionBits);
     const Spec row_spec{{1, fraction, false}, Rounding::rnd_conv, Overflow::sat};
     unit.rows = Table(rows, 1);
     unit.rows.wire = static_cast<int>(Wire::slab_alpha);
@@ -89,7 +89,7 @@ OpacityUnit computed_opacity_unit(const WireSpecs& specs) {
 
 }  // namespace
 
-OpacityUnit build_opacity_unit(const WireSpecs& specs) {
+OpacityUnit build_opacity_unit(const WireSpecs& specs, double longest_ray) {
     // It knows nothing of the transfer function, and copies share their rows: the last few formats are kept.
     struct Kept {
         Spec depth, alpha;
@@ -98,11 +98,76 @@ OpacityUnit build_opacity_unit(const WireSpecs& specs) {
     static thread_local std::vector<Kept> kept;
     const Spec depth = specs[Wire::slab_depth], alpha = specs[Wire::slab_alpha];
     for (const Kept& k : kept)
-        if (k.depth == depth && k.alpha == alpha) return k.unit;
+        if (k.depth == depth && k.alpha == alpha) {
+            OpacityUnit unit = k.unit;
+            unit.longest_ray = longest_ray;
+            return unit;
+        }
     if (kept.size() == 4) kept.erase(kept.begin());
     kept.push_back({depth, alpha, computed_opacity_unit(specs)});
-    return kept.back().unit;
+    OpacityUnit unit = kept.back().unit;
+    unit.longest_ray = longest_ray;
+    return unit;
 }
+
+double lost_along_ray(double error, double least, double longest) {
+    const double slabs = least * longest > 1 ? 1 / least : longest;
+    return 255 * error * slabs * portable::exp(-slabs * least);
+}
+
+Approximation OpacityUnit::error() const {
+    // Of a depth x below a row h the line loses x h / 2 at most, h^2 / 8 of any; x e^-x is 1 / e at most.
+    const double h = std::ldexp(1.0, -row_bits);
+    return {"1 - exp(-x) between its rows", 255 * std::min(longest_ray * h * h / 8, h / 2 * 0.36788)};
+}
+
+EntryRows rows_for_opacity(const ClassificationInputs& in) {
+    // Between rows d apart in depth, x deep and more, an opacity is d^2 / 8 above its chord at most; d / 2 of
+    // its depth at most, where rows begin at nothing.
+    const auto lost = [&](int bits) {
+        double worst = 0;
+        for (int i = 0; i + 1 < in.entries.size(); ++i) {
+            const Entry &a = in.entries.entry[static_cast<std::size_t>(i)],
+                        &b = in.entries.entry[static_cast<std::size_t>(i) + 1];
+            if (a.opaque && b.opaque) continue;
+            const double d = std::ldexp(std::abs(b.extinction - a.extinction) * in.step_world, -bits);
+            const double least = std::min(a.extinction, b.extinction) * in.step_world;
+            if (d * d / 8 * std::min(in.longest_ray, 1 / (least + d / 4)) * 255 <= worst) continue;
+            worst = std::max(worst, std::min(lost_along_ray(std::min(d * d / 8, 1.0), least, in.longest_ray),
+                                             255 * std::min(d / 2 * 0.36788, 1.0)));
+        }
+        return worst;
+    };
+    EntryRows rows{0, lost(0)};
+    while (rows.lsb8 > kMayBeLeftOut && rows.bits < in.input_fraction &&
+           (in.entries.size() - 1) << (rows.bits + 1) <= kMostEntryRows)
+        ++rows.bits, rows.lsb8 = lost(rows.bits);
+    return rows;
+}
+
+namespace {
+
+/// Straight colours and opacities of a full step, 2^bits rows an entry.
+void write_rows(const ClassificationInputs& in, int bits, std::span<double> opacity, std::span<double> seen) {
+    const int per_entry = 1 << bits, last = in.entries.size() - 1;
+    for (int i = 0, row = 0; i <= last; ++i)
+        for (int k = 0; k < per_entry && row < static_cast<int>(opacity.size()); ++k, ++row) {
+            const Entry &a = in.entries.entry[static_cast<std::size_t>(i)],
+                        &b = in.entries.entry[static_cast<std::size_t>(std::min(i + 1, last))];
+            const double way = std::ldexp(k, -bits);
+            const Vec3 color = k == 0 ? a.color : a.color + (b.color - a.color) * way;
+            const double extinction =
+                k == 0 ? a.extinction : a.extinction + (b.extinction - a.extinction) * way;
+            opacity[static_cast<std::size_t>(row)] = -(extinction * in.step_world);
+            double* const to = seen.data() + 4 * row;
+            to[0] = color.x, to[1] = color.y, to[2] = color.z;
+        }
+    portable::expm1_each(opacity, opacity);
+    for (std::size_t i = 0; i < opacity.size(); ++i)
+        seen[4 * i + EntryLookup::alpha] = opacity[i] = -opacity[i];
+}
+
+}  // namespace
 
 EntryLookup build_entry_lookup(const ClassificationInputs& in) {
     const WireSpecs& specs = in.specs;
@@ -110,7 +175,10 @@ EntryLookup build_entry_lookup(const ClassificationInputs& in) {
                extinction = specs[Wire::table_extinction];
     const int n = in.entries.size();
     EntryLookup lookup;
-    lookup.table = Table(n, 4, in.keeps_exact), lookup.matter = Table(n, 2, in.keeps_exact);
+    const EntryRows needed = rows_for_opacity(in);
+    const int bits = lookup.row_bits = needed.bits, rows = ((n - 1) << bits) + 1;
+    lookup.bend = {"the opacity of a step between rows", needed.lsb8};
+    lookup.table = Table(rows, 4, in.keeps_exact), lookup.matter = Table(n, 2, in.keeps_exact);
     lookup.table.wire = static_cast<int>(Wire::table_color);
     lookup.table.last_wire = static_cast<int>(Wire::table_alpha);
     lookup.matter.wire = static_cast<int>(Wire::table_extinction);
@@ -119,61 +187,62 @@ EntryLookup build_entry_lookup(const ClassificationInputs& in) {
     lookup.last_segment = n - 2;
     // The square of an F-bit root has 2 F bits; a plain alpha has its own F.
     const bool rooted = in.settings.encoding == AlphaEncoding::sqrt_alpha;
+    if (rooted && alpha.format.fraction_bits == 0)
+        throw InputError(
+            fmt::format("precision.table_alpha: {} has no fraction bits, but the root of an "
+                        "opacity needs 1 or more",
+                        to_string(alpha.format)));
     Spec stored = alpha;
-    if (rooted) stored.format = {1, std::min(2 * alpha.format.fraction_bits, kMostFractionBits), false};
-    const auto size = static_cast<std::size_t>(n);
-    const std::unique_ptr<double[]> numbers = std::make_unique_for_overwrite<double[]>(7 * size);
-    const std::span<double> opacity(numbers.get(), size), seen(numbers.get() + size, 4 * size),
-        matter(numbers.get() + 5 * size, 2 * size);
+    if (rooted) stored.format = {1, std::min(2 * alpha.format.fraction_bits, kMostChosenFractionBits), false};
+    const auto size = static_cast<std::size_t>(n), row_count = static_cast<std::size_t>(rows);
+    const std::unique_ptr<double[]> numbers =
+        std::make_unique_for_overwrite<double[]>(5 * row_count + 2 * size);
+    const std::span<double> opacity(numbers.get(), row_count), seen(numbers.get() + row_count, 4 * row_count),
+        matter(numbers.get() + 5 * row_count, 2 * size);
     bool opaque = false;  // the entry before
     for (std::size_t i = 0; i < size; ++i) {
         const Entry& entry = in.entries.entry[i];
-        const double depth = entry.extinction * in.step_world;
-        opacity[i] = -depth, matter[2 * i] = depth;
+        matter[2 * i] = entry.extinction * in.step_world;
         matter[2 * i + 1] = entry.opaque ? static_cast<int>(EntryLookup::entry_is) : 0;
         if (entry.opaque && opaque) matter[2 * i - 1] += static_cast<int>(EntryLookup::segment_is);
         opaque = entry.opaque;
         lookup.has_opaque = lookup.has_opaque || opaque;
     }
-    portable::expm1_each(opacity, opacity);
-    for (double& alpha : opacity) alpha = -alpha;
-    for (std::size_t i = 0; i < size; ++i) {
-        const Vec3& c = in.entries.entry[i].color;
-        double* const row = seen.data() + 4 * i;
-        row[0] = c.x, row[1] = c.y, row[2] = c.z, row[EntryLookup::alpha] = opacity[i];
-    }
-    for (std::size_t i = 0; rooted && i < size; ++i)
+    write_rows(in, bits, opacity, seen);
+    for (std::size_t i = 0; rooted && i < row_count; ++i)
         seen[4 * i + EntryLookup::alpha] = decoded_alpha(opacity[i], alpha, in.settings.encoding);
     lookup.table.fill(seen, std::array{color, color, color, stored});
-    for (int i = 0; rooted && i < n; ++i)
+    for (int i = 0; rooted && i < rows; ++i)
         lookup.table.set_exact(i, EntryLookup::alpha, opacity[static_cast<std::size_t>(i)], stored.format);
     lookup.matter.fill(matter,
                        std::array{extinction, Spec{{2, 0, false}, Rounding::rnd_conv, Overflow::sat}});
     lookup.table.pair_rows();
     const Spec slab_alpha = specs[Wire::slab_alpha];
     // A straight colour leaves on the wire slab_ratio, an opacity on slab_alpha.
-    lookup.to_color = Rescale(color.format.fraction_bits + in.input_fraction, specs[Wire::slab_ratio],
+    lookup.to_color = Rescale(color.format.fraction_bits + in.input_fraction - bits, specs[Wire::slab_ratio],
                               static_cast<int>(Wire::slab_ratio));
-    lookup.to_alpha = Rescale(stored.format.fraction_bits + in.input_fraction, slab_alpha,
+    lookup.to_alpha = Rescale(stored.format.fraction_bits + in.input_fraction - bits, slab_alpha,
                               static_cast<int>(Wire::slab_alpha));
     lookup.least_opaque = lookup.to_alpha.wraps ? slab_alpha.format.smallest() : slab_alpha.format.largest();
     for (int i = 0; lookup.has_opaque && i < n; ++i)
         if (in.entries.entry[static_cast<std::size_t>(i)].opaque)
-            lookup.least_opaque =
-                std::min(lookup.least_opaque,
-                         quantise(shift_left(lookup.table.word(i, EntryLookup::alpha), in.input_fraction),
-                                  lookup.to_alpha) -
-                             1);
+            lookup.least_opaque = std::min(
+                lookup.least_opaque, quantise(shift_left(lookup.table.word(i << bits, EntryLookup::alpha),
+                                                         in.input_fraction - bits),
+                                              lookup.to_alpha) -
+                                         1);
     lookup.length_fraction = specs[Wire::length].format.fraction_bits;
     const Spec depth = specs[Wire::slab_depth];
     lookup.to_depth = Rescale(extinction.format.fraction_bits + in.input_fraction, depth,
                               static_cast<int>(Wire::slab_depth));
-    lookup.to_shorter = Rescale(depth.format.fraction_bits + lookup.length_fraction, depth,
-                                static_cast<int>(Wire::slab_depth));
+    lookup.to_shorter = Rescale(depth.format.fraction_bits, depth, static_cast<int>(Wire::slab_depth));
+    lookup.to_shorter.divides = true;
+    lookup.table_color_fraction = color.format.fraction_bits;
+    lookup.extinction_fraction = extinction.format.fraction_bits;
     lookup.color_fraction = specs[Wire::slab_ratio].format.fraction_bits;
     lookup.alpha_fraction = slab_alpha.format.fraction_bits;
     lookup.one_alpha = std::min(slab_alpha.format.one(), slab_alpha.format.largest());
-    lookup.opacity = build_opacity_unit(specs);
+    lookup.opacity = build_opacity_unit(specs, in.longest_ray);
     return lookup;
 }
 

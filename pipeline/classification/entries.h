@@ -7,6 +7,8 @@
 #include "fixedpoint/words.h"
 #include "scene/scene.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cstdint>
 #include <string>
@@ -21,10 +23,22 @@ struct TableReport {
     std::int64_t rows = 0, columns = 0, bytes = 0;
     std::string note;
 };
+/// What tables leave out: at most `lsb8` of 255 in all, along the scene's longest ray.
+struct Approximation {
+    std::string of;
+    double lsb8 = 0;
+};
+/// What may be left out where the room allows: a quarter of an LSB8 along the longest ray.
+inline constexpr double kMayBeLeftOut = 0.25;
+
 /// What a method has built, and what its builder decided: for `squint plan`.
 struct ClassificationReport {
     std::vector<TableReport> tables;
     std::vector<std::string> notes;
+    std::vector<Approximation> approximations;
+    void add(const Approximation& a) {
+        if (a.lsb8 > 0) approximations.push_back(a);
+    }
     void add(std::string name, const Table& table, std::string note = {}) {
         if (table.rows() > 0)
             tables.push_back({std::move(name), table.rows(), table.columns(),
@@ -47,7 +61,11 @@ struct OpacityUnit {
     Table rows;
     int row_bits = 0;
     int depth_fraction = 0, alpha_fraction = 0;
+    double longest_ray = 1;  // steps
     Rescale to_alpha;
+
+    /// Of the lines between rows.
+    Approximation error() const;
 };
 
 /// A sample in units of table entries: the scalar itself where there is an entry for every level.
@@ -72,6 +90,7 @@ InputStage build_input(const StageInputs& in);
 struct EntrySpacing {
     int input_fraction = 0;
     int last_segment = 0;  // entries - 2
+    int row_bits = 0;      // 2^bits rows an entry, where the opacity of a step bends between entries
 };
 
 /// The sampled transfer function in words.
@@ -79,8 +98,8 @@ struct EntryLookup : EntrySpacing {
     enum Column { red, green, blue, alpha };       // of `table`
     enum MatterColumn { extinction, opaque };      // of `matter`
     enum Opaque { entry_is = 1, segment_is = 2 };  // bits of the column `opaque`
-    Table table;                                   // what a full step of each entry looks like
-    Table matter;                                  // what it is made of
+    Table table;                                   // what a full step looks like: a row, or several, an entry
+    Table matter;                                  // what each entry is made of
     bool has_opaque = false;
     std::int64_t least_opaque = 0;  // opacity that no full step of an opaque entry falls below
     Rescale to_color, to_alpha;     // lerps between entries
@@ -89,7 +108,9 @@ struct EntryLookup : EntrySpacing {
     int length_fraction = 0;
     std::int64_t one_alpha = 0;
     int color_fraction = 0, alpha_fraction = 0;  // of the straight colour and the opacity that come out
+    int table_color_fraction = 0, extinction_fraction = 0;  // of the tables' words
     OpacityUnit opacity;
+    Approximation bend;  // of the opacity of a step, between rows
 
     template <class V>
     void visit(V&& v) {
@@ -97,9 +118,13 @@ struct EntryLookup : EntrySpacing {
             v(opacity.to_alpha);
     }
     void describe(ClassificationReport& report) const {
-        report.add("entries", table, "colour and opacity of every entry");
+        report.add("entries", table,
+                   row_bits ? fmt::format("colour and opacity, {} rows an entry", 1 << row_bits)
+                            : "colour and opacity of every entry");
         report.add("matter", matter, "extinction and opaque of every entry");
         report.add("opacity", opacity.rows, "1 - exp(-x) over the optical depth");
+        report.add(bend);
+        report.add(opacity.error());
     }
 };
 
@@ -112,11 +137,26 @@ struct ClassificationInputs {
     int input_fraction = 0;
     bool keeps_exact =
         true;  // unrounded values beside the words: what Real reads of a wire that is not rounded
+    double longest_ray = 1;  // in steps: what errors of one sign add up over
 };
+
+/// What a ray loses at most, of 255, where each of its slabs is off by `error` of optical depth and at least
+/// `least` deep: m error e^(-m least) at its worst number of slabs m <= longest.
+double lost_along_ray(double error, double least, double longest);
+
+/// log2 of the rows an entry needs so that the opacity of a step, linear between rows, loses no more than
+/// kMayBeLeftOut along the longest ray, as far as the input's fraction bits and kMostEntryRows allow; and what
+/// is lost.
+struct EntryRows {
+    int bits = 0;
+    double lsb8 = 0;
+};
+EntryRows rows_for_opacity(const ClassificationInputs& inputs);
+inline constexpr int kMostEntryRows = 8192;  // above, the tables outgrow the caches by far
 
 /// The entries in words.  Throws InputError for formats that cannot hold them.
 EntryLookup build_entry_lookup(const ClassificationInputs& inputs);
-OpacityUnit build_opacity_unit(const WireSpecs& specs);
+OpacityUnit build_opacity_unit(const WireSpecs& specs, double longest_ray = 1);
 
 /// Throws InputError, naming the integer bits it takes, where a wire's format cannot hold `largest`.
 void require_range(const WireSpecs& specs, Wire wire, double largest, const char* what);

@@ -48,6 +48,13 @@ void share_tables(M& method, N&& built) {
     for (std::size_t i = 0; i < from.size(); ++i) to[i]->share(*from[i]);
 }
 
+template <class M>
+void take_exact(M& method, const M& built) {
+    M from = built;
+    share_tables(method, from);
+    if constexpr (requires { method.exact; }) method.exact = built.exact;
+}
+
 }  // namespace
 
 void need_exact(ClassificationMethod& method, ClassificationInputs inputs) {
@@ -59,7 +66,7 @@ void need_exact(ClassificationMethod& method, ClassificationInputs inputs) {
         if constexpr (std::is_same_v<M, PreIntegrated2D>)
             share_tables(m.prefix, build_prefix_lookup(inputs));
         else
-            share_tables(m, std::get<M>(build_method(inputs)));
+            take_exact(m, std::get<M>(build_method(inputs)));
     };
     std::visit(build, method);
 }

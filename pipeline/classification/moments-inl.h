@@ -57,7 +57,7 @@ HWY_INLINE SlabParts<W> slab_parts(const MomentSeries& m, const MomentEnd<W>& a,
     const W first = clamp(select(same, b.depth, a.next) - a.depth, zero, one);
     parts.whole = clamp(select(same, zero, b.start - a.next), zero, one);
     const W last = clamp(select(same, zero, b.depth - b.start), zero, one);
-    parts.span = within(max(first + parts.whole + last, constant<W>(1)), 1, unit);
+    parts.span = within(divisor<W>(first + parts.whole + last), 1, unit);
     parts.first_share = share_of(m, first, parts.span);
     parts.whole_share = share_of(m, parts.whole, parts.span);
     const W behind = min(parts.first_share + parts.whole_share, one);
@@ -103,7 +103,7 @@ HWY_INLINE Powers<W> mean_moments(const MomentSeries& m, const SlabParts<W>& p, 
     for (std::size_t pass = 1; pass < count; ++pass)
         for (std::size_t k = count - 1; k >= pass; --k)
             moment[k] = clamp(moment[k] - quantise(p.a.next * moment[k - 1], m.to_product), zero, one);
-    const W whole = max(p.whole, constant<W>(1));
+    const W whole = divisor<W>(p.whole);
     // Of a thin part the words hold the lower moments alone.
     for (std::size_t k = 0; k < count; ++k) {
         for (std::size_t times = 0; times <= k; ++times) moment[k] = share_of(m, moment[k], whole);
@@ -224,8 +224,8 @@ HWY_NOINLINE std::array<W, 3> color_in_pieces(const MomentSeries& m, const CutSl
     const PrefixLookup& p = m.prefix;
     const W zero = constant<W>(0), one = constant<W>(p.entries.one_alpha);
     const W difference = floor_shift(whole.difference, p.gained_bits());
-    const W share = min(floor_shift(difference, 2), divide(difference * constant<W>(m.limit),
-                                                           max(whole.depth, constant<W>(1)), m.to_cut));
+    const W share = min(floor_shift(difference, 2),
+                        divide(difference * constant<W>(m.limit), divisor<W>(whole.depth), m.to_cut));
     const auto ascending = front < cut.end_input;
     const W signed_share = select(ascending, share, zero - share);
     const W low = min(front, cut.end_input), high = max(front, cut.end_input);
@@ -237,7 +237,7 @@ HWY_NOINLINE std::array<W, 3> color_in_pieces(const MomentSeries& m, const CutSl
         const W far =
             piece == kPieces ? cut.end_input : clamp(input_at_depth(m, max(target, zero)), low, high);
         const W far_depth = depth_at(p, entry_position(p.entries, far));
-        const W depth = depth_of(p, absolute(far_depth - near_depth), max(cut.span, constant<W>(1)), length);
+        const W depth = depth_of(p, absolute(far_depth - near_depth), divisor<W>(cut.span), length);
         const std::array<W, 3> color = series_color(m, near, far, depth);
         const W part =
             min(quantise(through * opacity_of_depth(p.entries.opacity, depth), m.to_piece), through);
@@ -245,7 +245,7 @@ HWY_NOINLINE std::array<W, 3> color_in_pieces(const MomentSeries& m, const CutSl
         through = through - part;
         near = far, near_depth = far_depth;
     }
-    const W seen = max(one - through, constant<W>(1));
+    const W seen = divisor<W>(one - through);
     for (std::size_t c = 0; c < 3; ++c)
         light[c] =
             clamp(divide(light[c], seen, m.to_whole), constant<W>(m.lowest[c]), constant<W>(m.highest[c]));
@@ -254,10 +254,12 @@ HWY_NOINLINE std::array<W, 3> color_in_pieces(const MomentSeries& m, const CutSl
 
 template <class W>
 HWY_INLINE Slab<W> classify(const MomentSeries& m, W front, W back, W length) {
+    if constexpr (std::is_same_v<W, Real<double>>)
+        if (m.exact && !m.moments.active && !m.prefix.depth.active)
+            return exact_slab_of(m.prefix.entries, *m.exact, front, back, length);
     const CutSlab<W> cut = cut_at_wall(m.prefix, front, back);
     const W difference = absolute(depth_at(m.prefix, cut.end) - depth_at(m.prefix, cut.front));
-    const SlabDepth<W> whole{difference,
-                             depth_of(m.prefix, difference, max(cut.span, constant<W>(1)), length)};
+    const SlabDepth<W> whole{difference, depth_of(m.prefix, difference, divisor<W>(cut.span), length)};
     Slab<W> slab{series_color(m, front, cut.end_input, whole.depth),
                  opacity_of_depth(m.prefix.entries.opacity, whole.depth)};
     if (m.splits) {

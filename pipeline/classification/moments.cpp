@@ -16,7 +16,7 @@
 namespace squint {
 namespace {
 
-constexpr int kMostRows = 8192;       // sub-entries: above, the tables outgrow the caches by far
+constexpr int kMostRows = kMostEntryRows;
 constexpr int kMostDeepRows = 32768;  // where an entry is deeper than 8: 2 rows err by 39 LSB8, 8 by 5
 constexpr std::int64_t kMostValues = 8 << 20;
 
@@ -246,6 +246,7 @@ void MomentSeries::describe(ClassificationReport& report) const {
                fmt::format("overlapped levels of depth and {} moments a channel, {} sub-entr{} an entry",
                            order, 1 << sub_entry_bits, sub_entry_bits ? "ies" : "y"));
     report.add("weights", weights, "of the Legendre moments over the optical depth");
+    report.add(rows_of_color);
     report.notes.push_back(note);
 }
 
@@ -262,7 +263,8 @@ MomentSeries build_moment_series(const ClassificationInputs& in) {
     // Sub-entries where one entry alone is deep.
     const double deepest = preintegration::deepest_entry(in.entries, in.step_world);
     const int wanted = deepest <= 1 ? 0 : deepest <= 8 ? 2 : 3;
-    m.sub_entry_bits = std::min(std::max(wanted, sub_entry_bits_for_color(in, kMostRows)), in.input_fraction);
+    const EntryRows for_color = rows_for_color(in, kMostRows);
+    m.sub_entry_bits = std::min(std::max(wanted, for_color.bits), in.input_fraction);
     const int most_rows = wanted == 3 ? kMostDeepRows : kMostRows;
     const auto too_many = [&] {
         const int steps = (in.entries.size() - 1) << m.sub_entry_bits;
@@ -270,6 +272,8 @@ MomentSeries build_moment_series(const ClassificationInputs& in) {
                all_rows(steps) * (1 + 3 * m.order) > kMostValues;
     };
     while (m.sub_entry_bits > 0 && too_many()) --m.sub_entry_bits;
+    m.rows_of_color = {"a colour constant in a sub-entry",
+                       std::ldexp(for_color.lsb8, for_color.bits - m.sub_entry_bits)};
     Entries between;
     if (m.sub_entry_bits) between = preintegration::subdivided(in.entries, 1 << m.sub_entry_bits);
     const Entries& fine = m.sub_entry_bits ? between : in.entries;
@@ -325,6 +329,7 @@ MomentSeries build_moment_series(const ClassificationInputs& in) {
                            "deeper than {} take PIPS(1)",
                            m.order, m.word_fraction, limit);
     }
+    if (in.keeps_exact) m.exact = exact_series_of(in);
     return m;
 }
 

@@ -21,6 +21,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 
 namespace squint {
@@ -72,6 +73,8 @@ struct MomentSeries {
     Rescale to_piece;  // a piece's share of the light
     Rescale to_whole;  // pieces' light over their opacity
     std::string note;
+    Approximation rows_of_color;                               // constant in a sub-entry
+    std::shared_ptr<const preintegration::ExactSeries> exact;  // without rounding: no rows, no sub-entries
 
     template <class V>
     void visit(V&& v) {

@@ -2,6 +2,11 @@
 
 #include "pipeline/classification/tables/pi1d_table.h"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+
 namespace squint {
 
 PreIntegrated1D build_pre_integrated_1d(const ClassificationInputs& in) {
@@ -15,19 +20,38 @@ PreIntegrated1D build_pre_integrated_1d(const ClassificationInputs& in) {
     const Spec sum = in.specs[Wire::table_moment];
     require_range(in.specs, Wire::table_moment, tables.sum.back(),
                   "the prefix sums of the entries' opacities");
-    m.sums = Table(in.entries.size(), PreIntegrated1D::columns, in.keeps_exact);
+    // Straight sums give a slab of one last bit the mean of its entry.
+    double lost = 0;
+    const auto& values = tables.value;
+    for (std::size_t i = 0; i + 1 < values.size(); ++i)
+        lost = std::max(lost, lost_along_ray(std::abs(values[i + 1] - values[i]) / 2,
+                                             std::min(values[i], values[i + 1]), in.longest_ray));
+    m.curved = lost > kMayBeLeftOut && in.input_fraction > 0;
+    if (!m.curved) m.straight = {"sums straight between entries", std::min(lost, 255.0)};
+    m.sum_fraction = sum.format.fraction_bits;
+    const int columns = (m.curved ? 2 : 1) * PreIntegrated1D::columns;
+    m.sums = Table(in.entries.size(), columns, in.keeps_exact);
     m.sums.wire = static_cast<int>(Wire::table_moment);
     static_assert(PreIntegrated1D::value == 3 && PreIntegrated1D::columns == 4);
     std::vector<double> sums;
-    sums.reserve(tables.sum.size() * 4);
-    for (std::size_t i = 0; i < tables.sum.size(); ++i)
+    sums.reserve(tables.sum.size() * static_cast<std::size_t>(columns));
+    for (std::size_t i = 0; i < tables.sum.size(); ++i) {
         for (const std::vector<double>* column :
              {&tables.colored_sum[0], &tables.colored_sum[1], &tables.colored_sum[2], &tables.sum})
             sums.push_back((*column)[i]);
-    m.sums.fill(sums, std::array{sum, sum, sum, sum});
+        if (!m.curved) continue;
+        const std::size_t next = std::min(i + 1, values.size() - 1);
+        for (const std::vector<double>* column :
+             {&tables.colored[0], &tables.colored[1], &tables.colored[2], &tables.value})
+            sums.push_back((*column)[next] - (*column)[i]);
+    }
+    Spec bend = sum;
+    bend.format.is_signed = true;
+    const std::array specs{sum, sum, sum, sum, bend, bend, bend, bend};
+    m.sums.fill(sums, std::span(specs).first(static_cast<std::size_t>(columns)));
     m.most_rise = most_rise_of(m.sums, PreIntegrated1D::columns);
-    const int mean =
-        sum.format.fraction_bits;  // of a sum with input_fraction bits more over a span with them
+    // Of a sum over a span: an input's fraction bits are in both, a bend brings as many more and one.
+    const int mean = sum.format.fraction_bits + (m.curved ? in.input_fraction + 1 : 0);
     const auto to = [&](Wire wire) {
         Rescale quotient(mean, in.specs[wire], static_cast<int>(wire));
         quotient.divides = true;

@@ -17,10 +17,16 @@ namespace squint {
 struct PreIntegrated1D {
     static constexpr bool kPremultiplied = true;
     static constexpr bool kNeedsBack = true;
-    enum Column { value = 3, columns = 4 };  // red, green, blue before it
+    enum Column {
+        value = 3,
+        columns = 4
+    };  // red, green, blue before it; where `curved`, their bends behind it
     PrefixLookup prefix;
     PremultipliedRules premultiplied;
-    Table sums;                  // prefix sums of value times colour, and of value
+    Table sums;              // prefix sums of value times colour, and of value
+    bool curved = false;     // they bend between entries, where values are linear; else straight
+    Approximation straight;  // where they do not
+    int sum_fraction = 0;
     std::int64_t most_rise = 0;  // of any sum from row to row
     bool is_opacity = true;
     Rescale to_color;  // means
@@ -36,6 +42,7 @@ struct PreIntegrated1D {
         report.add("sums", sums,
                    is_opacity ? "prefix sums of opacity and coloured opacity, for one slab length"
                               : "prefix sums of clamped depth and coloured depth, for one slab length");
+        report.add(straight);
     }
 };
 PreIntegrated1D build_pre_integrated_1d(const ClassificationInputs& inputs);

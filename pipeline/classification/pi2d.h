@@ -20,8 +20,9 @@ struct PreIntegrated2D {
     CellTable cells;
     bool nearest = false, self_attenuation = true;
     int entries = 0;
-    int node_fraction = 0;       // of a coordinate in nodes
-    bool scaled = false;         // nodes are not one entry apart
+    int node_fraction = 0;  // of a coordinate in nodes
+    bool scaled = false;    // nodes are not one entry apart
+    Approximation between_nodes;
     Rescale to_node;             // input (size - 1) / (entries - 1)
     Rescale to_color, to_alpha;  // lerps between cells
 

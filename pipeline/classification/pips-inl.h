@@ -31,16 +31,19 @@ struct PrefixSample {
     W input;
     EntryPosition<W> at;           // in rows of T
     std::array<W, 4> sums, rises;  // T and X1 at the row, and their rise to the next
+    Wide<W> bend;                  // what T's bend takes from it
 };
 template <class W>
 HWY_INLINE PrefixSample<W> sample_of(const PowerSeriesOfOrder1& m, W input) {
-    PrefixSample<W> s{input, sub_entry_position(m.prefix.entries, m.prefix.sub_entry_bits, input), {}, {}};
+    PrefixSample<W> s{
+        input, sub_entry_position(m.prefix.entries, m.prefix.sub_entry_bits, input), {}, {}, {}};
     s.at.fraction = within(s.at.fraction, 0, std::int64_t{1} << m.prefix.place_bits());
     const std::array<std::array<W, 4>, 2> rows = prefix_rows(m, s.at.entry);
     s.sums = rows[0];
     const auto rise = [&](std::size_t c)
                           SQUINT_WRITTEN_OUT { return within(rows[1][c] - rows[0][c], 0, m.most_rise); };
     s.rises = {rise(0), rise(1), rise(2), rise(3)};
+    if (m.prefix.curved) s.bend = bend_at(m.prefix, s.at);
     return s;
 }
 
@@ -59,17 +62,15 @@ HWY_INLINE Slab<W> classify(const PowerSeriesOfOrder1& m, const PrefixSample<W>&
     const int bits = m.prefix.place_bits();
     const Wide<W> straight = prefix_difference(front, end, 0, bits);
     Wide<W> depth = straight;
-    if (m.prefix.curved)
-        depth = shift_left(straight, bits + 1) - (bend_at(m.prefix, end.at) - bend_at(m.prefix, front.at));
+    if (m.prefix.curved) depth = shift_left(straight, bits + 1) - (end.bend - front.bend);
     depth = absolute(depth);
     const W zero = constant<W>(0), one = constant<W>(m.one_ratio);
     Slab<W> slab{{zero, zero, zero}, zero};
     if (any_positive(depth))
-        slab.alpha =
-            opacity_of_depth(m.prefix.entries.opacity,
-                             depth_of(m.prefix, depth, widen(max(cut.span, constant<W>(1))), length));
+        slab.alpha = opacity_of_depth(m.prefix.entries.opacity,
+                                      depth_of(m.prefix, depth, widen(divisor<W>(cut.span)), length));
     if (any(zero < slab.alpha)) {  // of what is not seen the colour is any
-        const Wide<W> some = max(absolute(straight), widen(constant<W>(1)));
+        const Wide<W> some = divisor<W>(absolute(straight));
         for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
             const Wide<W> colored = absolute(prefix_difference(front, end, c + 1, bits));
             slab.color[c] = min(divide(colored, some, m.to_ratio), one);
@@ -87,6 +88,9 @@ HWY_INLINE Slab<W> classify(const PowerSeriesOfOrder1& m, const PrefixSample<W>&
 }
 template <class W>
 HWY_INLINE Slab<W> classify(const PowerSeriesOfOrder1& m, W front, W back, W length) {
+    if constexpr (std::is_same_v<W, Real<double>>)
+        if (m.exact && !m.moment.active && !m.prefix.depth.active)
+            return exact_slab_of(m.prefix.entries, *m.exact, front, back, length);
     return classify(m, sample_of(m, front), sample_of(m, back), length);
 }
 

@@ -12,9 +12,11 @@ namespace squint {
 
 PowerSeriesOfOrder1 build_power_series_of_order_1(const ClassificationInputs& in) {
     PowerSeriesOfOrder1 m;
-    constexpr int kMostRows = 8192;
-    const int bits = sub_entry_bits_for_color(in, kMostRows);
+    const EntryRows color_rows = rows_for_color(in, kMostEntryRows);
+    const int bits = color_rows.bits;
+    m.rows_of_color = {"the mean colour of a row of X1", color_rows.lsb8};
     m.prefix = build_prefix_lookup(in, bits);
+    if (in.keeps_exact) m.exact = exact_series_of(in);
     const Spec moment = in.specs[Wire::table_moment], ratio = in.specs[Wire::slab_ratio];
     Entries between;
     if (bits) between = preintegration::subdivided(in.entries, 1 << bits);

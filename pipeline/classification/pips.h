@@ -25,6 +25,8 @@ struct PowerSeriesOfOrder1 {
     std::int64_t most_rise = 0;                             // of T or X1 from row to row
     Rescale to_ratio;
     std::int64_t one_ratio = 0;
+    Approximation rows_of_color;                               // the mean colour of a row
+    std::shared_ptr<const preintegration::ExactSeries> exact;  // without rounding: no rows
 
     template <class V>
     void visit(V&& v) {
@@ -33,6 +35,7 @@ struct PowerSeriesOfOrder1 {
     void describe(ClassificationReport& report) const {
         prefix.describe(report);
         report.add("X1", moment, "prefix sums of colour over depth");
+        report.add(rows_of_color);
     }
 };
 PowerSeriesOfOrder1 build_power_series_of_order_1(const ClassificationInputs& inputs);

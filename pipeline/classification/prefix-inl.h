@@ -13,6 +13,8 @@
 
 #include <hwy/highway.h>
 
+#include <type_traits>
+
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
@@ -33,14 +35,16 @@ HWY_INLINE W prefix_at(const Table& table, const EntryPosition<W>& at, int colum
                  at.fraction, bits);
 }
 
-/// Where an input stands between two sub-entries.
-template <class W>
-HWY_INLINE EntryPosition<W> sub_entry_position(const EntryLookup& e, int sub_entry_bits, W input) {
-    const int bits = e.input_fraction - sub_entry_bits;
-    const std::int64_t last = (static_cast<std::int64_t>(e.last_segment + 1) << sub_entry_bits) - 1;
-    const W entry = min(floor_shift(input, bits), constant<W>(last));
-    const std::int64_t one = std::int64_t{1} << bits;
-    return {entry, within(min(input - shift_left(entry, bits), constant<W>(one)), 0, one)};
+/// What a quotient may divide by: x >= 0, or a last bit where it is zero.  Without rounding every x above zero
+/// is itself.  N: the word or its Wide.
+template <class W, class N>
+HWY_INLINE N divisor(const N& x) {
+    if constexpr (RealWord<W>)
+        return select(constant<W>(0) < x, x, constant<W>(1));
+    else if constexpr (std::is_same_v<N, W>)
+        return max(x, constant<W>(1));
+    else
+        return max(x, widen(constant<W>(1)));
 }
 
 /// T, exact with gained_bits() more fraction bits than its words.  With tau linear over a row's reach,
@@ -70,20 +74,24 @@ HWY_INLINE Wide<W> prefix_difference(const Table& table, const EntryPosition<W>&
     };
     return wide_sum(to - from, bits, part(end, to) - part(front, from));
 }
-/// What T's bend takes from it (depth_at).
+/// What the bend of a prefix sum takes from it, for a change by `bends`' column over a row (depth_at).
 template <class W>
-HWY_INLINE Wide<W> bend_at(const PrefixLookup& p, const EntryPosition<W>& at) {
-    const std::int64_t one = std::int64_t{1} << p.place_bits();
+HWY_INLINE Wide<W> bend_at(const Table& bends, const EntryPosition<W>& at, int column, int place_bits) {
+    const std::int64_t one = std::int64_t{1} << place_bits;
     const W part = within(at.fraction, 0, one);
     const W hollow = within(part * (constant<W>(one) - part), 0, one * one / 4);
-    return wide_product(hollow, gather(p.depth, at.entry, 1));
+    return wide_product(hollow, gather(bends, at.entry, column));
+}
+template <class W>
+HWY_INLINE Wide<W> bend_at(const PrefixLookup& p, const EntryPosition<W>& at) {
+    return bend_at(p.depth, at, 1, p.place_bits());
 }
 
 /// A slab cut where it first meets an opaque entry: in either direction, both ends included.
 template <class W>
 struct CutSlab {
     EntryPosition<W> front, end;  // the translucent part
-    W end_input;
+    W front_input, end_input;
     W span;  // |s_b - s_f| of the whole slab: the rate is kept
     W wall;  // 1 where an opaque entry ends it
     W wall_entry;
@@ -92,7 +100,7 @@ template <class W>
 HWY_INLINE CutSlab<W> cut_at_wall(const PrefixLookup& p, W front, W back) {
     const int bits = p.entries.input_fraction;
     const W zero = constant<W>(0), one = constant<W>(1);
-    CutSlab<W> cut{entry_position(p.entries, front), {}, back, absolute(back - front), zero, zero};
+    CutSlab<W> cut{entry_position(p.entries, front), {}, front, back, absolute(back - front), zero, zero};
     W end = back;
     if (p.predicts) {
         const auto ascending = front < back;
@@ -116,23 +124,79 @@ template <class N, class W>
 HWY_INLINE W depth_of(const PrefixLookup& p, const N& difference, const N& span, W length) {
     W depth = divide(difference, span, p.to_depth);
     const auto shorter = length < constant<W>(std::int64_t{1} << p.entries.length_fraction);
-    if (any(shorter)) depth = select(shorter, quantise(depth * length, p.to_shorter), depth);
+    if (any(shorter))
+        depth = select(shorter, shortened(depth, length, p.entries.length_fraction, p.to_shorter), depth);
     return depth;
 }
-/// The optical depth of a cut slab, where an entry has one row.
+/// What a curve through entries gives between two places: its mean over [low, high], of parts that nothing is
+/// subtracted from.  at(i): its value at entry i; between(i, j): its integral from entry i to j.
+template <class At, class Between>
+double mean_between(const EntryPosition<Real<double>>& low, const EntryPosition<Real<double>>& high,
+                    int input_fraction, const At& at, const Between& between) {
+    const double unit = power_of_two<double>(-input_fraction);
+    const double u = low.fraction.v * unit, v = high.fraction.v * unit;
+    const auto value = [&](double entry, double way) {
+        const double here = at(entry);
+        return way == 0 ? here : here + way * (at(entry + 1) - here);
+    };
+    const double i = low.entry.v, j = high.entry.v;
+    if (i == j) return (value(i, u) + value(i, v)) / 2;
+    const double first = (1 - u) * (value(i, u) + at(i + 1)) / 2, last = v * (at(j) + value(j, v)) / 2;
+    return (first + between(i + 1, j) + last) / ((j - i - 1) + (1 - u) + v);
+}
+/// Without rounding: of extinction itself, linear between entries, over the part up to the wall, which has its
+/// share of the span.
+inline Real<double> exact_depth(const PrefixLookup& p, const CutSlab<Real<double>>& cut,
+                                Real<double> length) {
+    const bool ascending = cut.front_input < cut.end_input;
+    const EntryPosition<Real<double>> front = entry_position(p.entries, cut.front_input),
+                                      end = entry_position(p.entries, cut.end_input);
+    const double rows = power_of_two<double>(p.sub_entry_bits);
+    const double mean = mean_between(
+        ascending ? front : end, ascending ? end : front, p.entries.input_fraction,
+        [&](double i) { return gather(p.entries.matter, Real<double>{i}, EntryLookup::extinction).v; },
+        [&](double i, double j) {
+            return gather(p.depth, Real<double>{j * rows}, 0).v -
+                   gather(p.depth, Real<double>{i * rows}, 0).v;
+        });
+    const double part = absolute(cut.end_input - cut.front_input).v / divisor<Real<double>>(cut.span).v;
+    Rescale to = p.to_depth;
+    to.shift += p.entries.input_fraction - p.gained_bits();
+    return shortened(quantise(Real<double>{mean * part}, to), length, p.entries.length_fraction,
+                     p.to_shorter);
+}
+
+/// The optical depth of a cut slab.
 template <class W>
 HWY_INLINE W slab_depth(const PrefixLookup& p, const CutSlab<W>& cut, W length) {
+    if constexpr (std::is_same_v<W, Real<double>>)
+        if (!p.depth.active) return exact_depth(p, cut, length);
     const int bits = p.place_bits();
     Wide<W> difference = prefix_difference(p.depth, cut.front, cut.end, 0, bits, p.most_rise);
     if (p.curved)
         difference = shift_left(difference, bits + 1) - (bend_at(p, cut.end) - bend_at(p, cut.front));
-    return depth_of(p, absolute(difference), widen(max(cut.span, constant<W>(1))), length);
+    return depth_of(p, absolute(difference), widen(divisor<W>(cut.span)), length);
+}
+
+/// Without rounding: a slab of the entries' own curves.
+inline Slab<Real<double>> exact_slab_of(const EntryLookup& e, const preintegration::ExactSeries& series,
+                                        Real<double> front, Real<double> back, Real<double> length) {
+    const double input = power_of_two<double>(-e.input_fraction);
+    const preintegration::SlabValue value = series.slab(
+        front.v * input, back.v * input, length.v * power_of_two<double>(-e.length_fraction) * series.step);
+    Rescale to_color = e.to_color, to_alpha = e.to_alpha;
+    to_color.shift = to_alpha.shift = 0;
+    const double color = value.alpha > 0 ? power_of_two<double>(e.color_fraction) / value.alpha : 0;
+    const auto channel = [&](int c) { return quantise(Real<double>{value.color[c] * color}, to_color); };
+    return {{channel(0), channel(1), channel(2)},
+            quantise(Real<double>{value.alpha * power_of_two<double>(e.alpha_fraction)}, to_alpha)};
 }
 
 /// The straight colour of the wall that ends a slab.
 template <class W>
 HWY_INLINE W wall_color(const EntryLookup& e, const CutSlab<W>& cut, int channel) {
-    return quantise(shift_left(gather(e.table, cut.wall_entry, channel), e.input_fraction), e.to_color);
+    const W color = gather(e.table, shift_left(cut.wall_entry, e.row_bits), channel);
+    return quantise(shift_left(color, e.input_fraction - e.row_bits), e.to_color);
 }
 /// Slabs that are one point: both ends equal, or a front that is opaque itself.
 template <class W>
@@ -177,7 +241,7 @@ HWY_INLINE W largest_color(const PremultipliedRules& r, W alpha) {
 /// A premultiplied part with another opacity: C alpha' / alpha.
 template <class W>
 HWY_INLINE Slab<W> with_alpha(const PremultipliedRules& r, Slab<W> part, W alpha) {
-    const W some = max(part.alpha, constant<W>(1)), limit = largest_color(r, alpha);
+    const W some = divisor<W>(part.alpha), limit = largest_color(r, alpha);
     for (W& color : part.color) color = min(divide(color * alpha, some, r.to_scaled), limit);
     part.alpha = alpha;
     return part;

@@ -7,27 +7,42 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
+#include <utility>
 
 namespace squint {
 
 namespace {
 
-// A straight T errs by half the change of extinction over a row in a slab of one last bit at its end: half an
-// LSB8 of opacity is left.
-constexpr double kStraightEnough = 1.0 / 255;
+// A straight T errs by half the change of extinction over a row in a slab of one last bit at its end, and a
+// ray along which the field is even meets that slab again and again.
+double lost_by_straight_lines(const Entries& rows, double step, double longest_ray) {
+    double worst = 0;
+    for (int i = 0; i + 1 < rows.size(); ++i) {
+        const Entry &a = rows.entry[static_cast<std::size_t>(i)],
+                    &b = rows.entry[static_cast<std::size_t>(i) + 1];
+        const double half = std::abs(b.extinction - a.extinction) * step / 2;
+        const double least = std::min(a.extinction, b.extinction) * step;
+        if (255 * half * std::min(longest_ray, 1 / (least + half)) <= worst) continue;
+        worst = std::max(worst, std::min(lost_along_ray(half, least, longest_ray), 255.0));
+    }
+    return worst;
+}
 
 }  // namespace
 
-int sub_entry_bits_for_color(const ClassificationInputs& in, int most_rows) {
-    double worst = kInsideEntry;  // and no less: one row is enough for that
-    if (largest_swing(in.entries.entry) * 2 / 3 <= worst) return 0;
+EntryRows rows_for_color(const ClassificationInputs& in, int most_rows) {
+    double worst = largest_swing(in.entries.entry) * 2 / 3;
+    if (worst <= kInsideEntry) return {0, 255 * worst};
+    worst = kInsideEntry;  // and no less: one row is enough for that
     for (int i = 0; i + 1 < in.entries.size(); ++i) {
         const Entry &a = in.entries.entry[static_cast<std::size_t>(i)],
                     &b = in.entries.entry[static_cast<std::size_t>(i) + 1];
         const double swing = std::max({std::abs(b.color.x - a.color.x), std::abs(b.color.y - a.color.y),
                                        std::abs(b.color.z - a.color.z)});
-        // The mean weighted by extinction is at most two thirds of the swing away from either end.
-        const double depth = std::max(a.extinction, b.extinction) * in.step_world;
+        // The mean weighted by extinction is at most two thirds of the swing away from either end, and so is
+        // that of a ray of such slabs.
+        const double depth = std::max(a.extinction, b.extinction) * in.step_world * in.longest_ray;
         if (swing * 2 / 3 * std::min(depth, 1.0) > worst)  // more than the opacity can make of it
             worst = std::max(worst, swing * 2 / 3 * -portable::expm1(-depth));
     }
@@ -35,7 +50,7 @@ int sub_entry_bits_for_color(const ClassificationInputs& in, int most_rows) {
     while (std::ldexp(worst, -bits) > kInsideEntry && bits < in.input_fraction &&
            (in.entries.size() - 1) << (bits + 1) <= most_rows)
         ++bits;
-    return bits;
+    return {bits, 255 * std::ldexp(worst, -bits)};
 }
 
 std::int64_t most_rise_of(const Table& sums, int columns) {
@@ -58,14 +73,15 @@ PrefixLookup build_prefix_lookup(const ClassificationInputs& in, int sub_entry_b
     p.sub_entry_bits = sub_entry_bits;
     const auto extinction_of = [&](int i) { return fine.entry[static_cast<std::size_t>(i)].extinction; };
     std::vector<double> depths(static_cast<std::size_t>(rows));
-    double bend = 0, sum = 0;  // trapezoids: exact for a linear extinction
+    double sum = 0;  // trapezoids: exact for a linear extinction
     for (int i = 0; i + 1 < rows; ++i) {
         const double a = extinction_of(i), b = extinction_of(i + 1);
-        bend = std::max(bend, std::abs(b - a));
         sum += 0.5 * (a + b);
         depths[static_cast<std::size_t>(i) + 1] = sum * step;
     }
-    p.curved = bend * in.step_world > kStraightEnough && p.place_bits() > 0;
+    const double lost = lost_by_straight_lines(fine, in.step_world, in.longest_ray);
+    p.curved = lost > kMayBeLeftOut && p.place_bits() > 0;
+    if (!p.curved) p.straight = {"T straight between its rows", lost};
     const std::size_t columns = p.curved ? 2 : 1;
     if (p.curved) {
         depths.resize(2 * depths.size());
@@ -88,7 +104,7 @@ PrefixLookup build_prefix_lookup(const ClassificationInputs& in, int sub_entry_b
     const int wire = static_cast<int>(Wire::slab_depth);
     p.to_depth = Rescale(extinction.format.fraction_bits + p.gained_bits() - in.input_fraction, depth, wire);
     p.to_depth.divides = true;
-    p.to_shorter = Rescale(depth.format.fraction_bits + p.entries.length_fraction, depth, wire);
+    p.to_shorter = p.entries.to_shorter;
     p.to_wall = Rescale(p.entries.color_fraction + p.entries.alpha_fraction, in.specs[Wire::slab_ratio],
                         static_cast<int>(Wire::slab_ratio));
     p.predicts = p.entries.has_opaque && in.settings.opaque_prediction;
@@ -101,6 +117,14 @@ PrefixLookup build_prefix_lookup(const ClassificationInputs& in, int sub_entry_b
         }
     }
     return p;
+}
+
+std::shared_ptr<const preintegration::ExactSeries> exact_series_of(const ClassificationInputs& in) {
+    preintegration::ExactSeries series =
+        preintegration::build_exact_series(in.entries, in.settings.order_or_least(),
+                                           in.settings.method == Method::leg, in.settings.opaque_prediction);
+    series.step = in.step_world;
+    return std::make_shared<const preintegration::ExactSeries>(std::move(series));
 }
 
 PremultipliedRules build_premultiplied_rules(const WireSpecs& specs) {

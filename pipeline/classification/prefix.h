@@ -3,6 +3,9 @@
 #pragma once
 
 #include "pipeline/classification/entries.h"
+#include "pipeline/classification/tables/exact_series.h"
+
+#include <memory>
 
 namespace squint {
 
@@ -19,6 +22,7 @@ struct PrefixLookup {
     Rescale to_depth;            // slab's depth: (T(b) - T(f)) / |s_b - s_f|
     Rescale to_shorter;          // times the slab's length
     Rescale to_wall;             // colour in front of a wall over the wall's
+    Approximation straight;      // of T, where it does not bend
     bool predicts = false;
     Table walls;  // up, down: the nearest opaque entry at or above, at or below; absent where none is opaque
 
@@ -34,6 +38,7 @@ struct PrefixLookup {
         report.add("T", depth,
                    curved ? "prefix sum of the entries' optical depths, and their bend"
                           : "prefix sum of the entries' optical depths");
+        report.add(straight);
         report.add("walls", walls, "nearest opaque entry above and below");
         if (entries.has_opaque)
             report.notes.push_back(predicts
@@ -47,9 +52,12 @@ std::int64_t most_rise_of(const Table& sums, int columns);
 PrefixLookup build_prefix_lookup(const ClassificationInputs& inputs, int sub_entry_bits = 0);
 
 /// log2 of the sub-entries an entry needs so that a colour constant inside them errs by kInsideEntry at most
-/// in any slab of one step, as far as `most_rows` rows and the input's fraction bits allow.
-int sub_entry_bits_for_color(const ClassificationInputs& inputs, int most_rows);
+/// along the longest ray, as far as `most_rows` rows and the input's fraction bits allow; and what is lost.
+EntryRows rows_for_color(const ClassificationInputs& inputs, int most_rows);
 inline constexpr double kInsideEntry = 2.0 / 255;
+
+/// PIPS(n) or LEG(n) as the settings ask, without rounding.
+std::shared_ptr<const preintegration::ExactSeries> exact_series_of(const ClassificationInputs& inputs);
 
 /// What methods with premultiplied colours share.
 struct PremultipliedRules {

@@ -123,19 +123,20 @@ void store_pixel(const Plan& plan, const Pixel<Real<float>>& pixel, int column, 
     store(plan, pixel, column, row, image);
 }
 
-Pixel<std::int64_t> project_pixel(const Plan& plan, std::int64_t scalar, std::int64_t slabs) {
+Pixel<std::int64_t> project_pixel(const Plan& plan, const ProjectedRay<std::int64_t>& ray) {
     return with_method(plan, [&](const auto& method) {
-        const auto in_words = [&]<class W>(W word) {
+        const auto in_words = [&]<class W>(WordTag<W>) {
             const Silent silent;
-            return projected(plan, method, word, constant<W>(slabs), nothing_yet<W>(plan.compositing),
-                             silent);
+            return projected(plan, method,
+                             ProjectedRay<W>{W{ray.kept}, W{ray.last_ends}, W{ray.slabs}, W{ray.last_length}},
+                             nothing_yet<W>(plan.compositing), silent);
         };
         Pixel<std::int64_t> pixel;
-        pixel.samples = slabs;
+        pixel.samples = ray.slabs;
         if (plan.word_bits == 64) {
-            pixel.gathered = in_words(scalar);
+            pixel.gathered = in_words(WordTag<std::int64_t>{});
         } else {
-            const Accumulated<Int128> wide = in_words(Int128{scalar});
+            const Accumulated<Int128> wide = in_words(WordTag<Int128>{});
             for (std::size_t c = 0; c < 3; ++c)
                 pixel.gathered.color[c] = static_cast<std::int64_t>(wide.color[c]);
             pixel.gathered.transparency = static_cast<std::int64_t>(wide.transparency);
@@ -173,7 +174,7 @@ namespace {
 class Collector : public Silent {
   public:
     Collector(std::vector<TraceEvent>& fresh, RayTrace& trace) : fresh_(fresh), trace_(trace) {}
-    void slab(Audited k) { flush(), current_ = to_index(k); }
+    void slab(const auto& k) { flush(), current_ = to_index(k); }
     void flush() {
         for (const TraceEvent& e : fresh_) trace_.events.push_back({current_, e});
         fresh_.clear();
@@ -195,12 +196,21 @@ RayTrace trace_ray(const Plan& plan, int column, int row) {
     for (WireStatistics& s : statistics) s.trace = &fresh;
     attach_statistics(traced, statistics);
     Collector collector(fresh, trace);
-    with_method(traced, [&](const auto& method) {
-        Pixel<Audited> pixel;
-        cast_ray(traced, method, FromVolume{*traced.volume}, ray_words<Audited>(traced, trace.setup),
-                 trace.setup.slabs, collector, pixel);
-        trace.color = color_of(traced.compositing, in_doubles(pixel.gathered));
-    });
+    const auto cast = [&]<class W>(WordTag<W>) {
+        with_method(traced, [&](const auto& method) {
+            Pixel<W> pixel;
+            cast_ray(traced, method, FromVolume{*traced.volume}, ray_words<W>(traced, trace.setup),
+                     trace.setup.slabs, collector, pixel);
+            trace.color = color_of(traced.compositing, in_doubles(pixel.gathered));
+        });
+    };
+    // The words that render() takes: one program, one picture.
+    if (plan.float32)
+        cast(WordTag<Real<float>>{});
+    else if (plan.real)
+        cast(WordTag<Real<double>>{});
+    else
+        cast(WordTag<Audited>{});
     collector.flush();
     return trace;
 }

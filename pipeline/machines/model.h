@@ -18,13 +18,15 @@ struct TileStatistics {
 
 template <class W>
 struct Pixel;
+template <class W>
+struct ProjectedRay;
 
 /// A finished pixel into every channel of an image: where fixed point meets float.
 void store_pixel(const Plan& plan, const Pixel<std::int64_t>& pixel, int column, int row, Image& image);
 void store_pixel(const Plan& plan, const Pixel<Real<float>>& pixel, int column, int row, Image& image);
 
-/// MIP, MinIP, average: the pixel of a ray with `slabs` samples, one at least, from their extreme or sum.
-Pixel<std::int64_t> project_pixel(const Plan& plan, std::int64_t scalar, std::int64_t slabs);
+/// MIP, MinIP, average: the pixel of a ray from what stands for it.
+Pixel<std::int64_t> project_pixel(const Plan& plan, const ProjectedRay<std::int64_t>& ray);
 
 class ModelRenderer {
   public:
@@ -44,6 +46,7 @@ class ModelRenderer {
 };
 
 /// Every value on every wire along one ray, in the order it was computed.  `slab` is -1 before the first.
+/// Where nothing is rounded an event's `exact` is the value itself.
 struct RayTrace {
     struct Event {
         std::int64_t slab;

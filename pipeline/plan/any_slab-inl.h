@@ -80,17 +80,24 @@ void any_slab(const Plan& plan, Observer& observer, int neighbours = 1) {
         [&](const auto& method) {
             Slabs slabs(plan, method, voxels, ray, up_to(most_slabs), observer);
             slabs.pixel.transparency = up_to(plan.compositing.unit(), width_of(Wire::transparency));
+            const int carried = std::max(plan.compositing.to_contribution.shift, 0);
+            if (plan.compositing.form == CompositingForm::w_carry)
+                slabs.pixel.remainder = up_to((std::int64_t{1} << carried) - 1, carried);
             for (W& c : slabs.pixel.color) c = any_of(plan.specs[Wire::color].format);
             if (!plan.projection_mode) {
                 for (int i = 0; i < neighbours; ++i) slabs.step(up_to(most_slabs - 1));
                 return;
             }
-            W scalar = slabs.sample(up_to(most_slabs)).input;
+            const W scalar = slabs.sample(up_to(most_slabs)).input;
             observer.at(Part::classification);
-            if (plan.scene.compositing.mode == CompositingMode::average)  // a sum of so many
-                scalar =
-                    up_to(static_cast<std::int64_t>(range_of(scalar).high) * most_slabs) + constant<W>(0);
-            slabs.project(scalar, up_to(most_slabs));
+            ProjectedRay<W> all{scalar, scalar, any_word(WordTag<W>{}, Range{1, most_slabs}, 0),
+                                ray.last_length};
+            if (plan.scene.compositing.mode == CompositingMode::average) {  // both ends of so many
+                const auto ends = 2 * static_cast<std::int64_t>(range_of(scalar).high);
+                all.kept = up_to(ends * most_slabs) + constant<W>(0);
+                all.last_ends = up_to(ends) + constant<W>(0);
+            }
+            slabs.project(all);
         },
         plan.method);
 }

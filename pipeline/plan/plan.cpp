@@ -1,5 +1,6 @@
 #include "pipeline/plan/plan.h"
 
+#include "pipeline/plan/demands.h"
 #include "pipeline/plan/findings.h"
 #include "pipeline/plan/ranges.h"
 #include "pipeline/stages/inputs.h"
@@ -34,26 +35,6 @@ Vec3 clipped_high(const Plan& plan) {
 
 // ----------------------------------------------------------------------------------------- formats
 
-PresetInputs preset_inputs(const Plan& plan) {
-    const Volume& volume = *plan.volume;
-    PresetInputs in;
-    in.scalar_bits = volume.scalar_bits;
-    in.location_bits = std::max(
-        1, bits_for(static_cast<double>(std::max({volume.dims.x, volume.dims.y, volume.dims.z})) - 1));
-    in.entry_bits = std::max(1, bits_for(plan.entries.size() - 1));
-    in.direction_bits = std::max(1, bits_for(plan.scene.sampling.step));
-    in.ray_bits = std::max(1, bits_for(most_steps(plan)));
-    double deepest = 0, total = 0;
-    for (const Entry& e : plan.entries.entry) {
-        deepest = std::max(deepest, e.extinction);
-        total += e.opaque ? std::max(e.extinction, 1 / plan.step_world) : e.extinction;
-    }
-    in.depth_bits = std::max(1, bits_for(deepest * plan.step_world));
-    in.total_depth_bits = std::max(1, bits_for(std::max(total, deepest) * plan.step_world));
-    in.step = plan.scene.sampling.step;
-    return in;
-}
-
 void apply_overrides(const PrecisionSettings& precision, WireSpecs& specs) {
     for (int w = 0; w < kWires; ++w) {
         const auto& text = precision.override_[static_cast<std::size_t>(w)];
@@ -75,7 +56,8 @@ ClassificationInputs classification_inputs(const Plan& plan) {
             plan.scene.classification,
             step,
             plan.specs[Wire::classification_input].format.fraction_bits,
-            false};
+            false,
+            plan.projection_mode ? 1 : most_steps(plan)};
 }
 
 void find_unseen_inputs(Plan& plan) {
@@ -92,16 +74,61 @@ void find_unseen_inputs(Plan& plan) {
     plan.unseen_from = input_at(behind - 1 + beside);
 }
 
+// What tables leave out along the longest ray, each and all.
+void report_approximations(Plan& plan) {
+    if (plan.projection_mode) return;
+    std::string parts;
+    double sum = 0;
+    for (const Approximation& a : plan.approximations) {
+        sum += a.lsb8;
+        parts += fmt::format("{}{} {:.2g}", parts.empty() ? "" : ", ", a.of, a.lsb8);
+    }
+    if (sum > 0)
+        plan.notes.push_back(fmt::format(
+            "what tables leave out, in all along the longest ray: at most {:.2g} of 255 ({})", sum, parts));
+}
+
 void plan_classification(Plan& plan) {
     plan.method = build_method(classification_inputs(plan));
     plan.needs_back =
         !plan.projection_mode && std::visit([](const auto& m) { return m.kNeedsBack; }, plan.method);
+    if (plan.needs_back && plan.scene.sampling.interpolation == InterpolationRule::nearest)
+        throw InputError(
+            fmt::format("classification.method: {} integrates between two samples, where the nearest field "
+                        "jumps: values between two labels are not in the volume; with "
+                        "sampling.interpolation = \"nearest\" pc and pc_mid are allowed",
+                        name_of(plan.scene.classification.method)));
     plan.entry_reach = std::visit([](const auto& m) { return entry_reach(m); }, plan.method);
     find_unseen_inputs(plan);
     ClassificationReport report;
     std::visit([&](const auto& m) { m.describe(report); }, plan.method);
     plan.tables = std::move(report.tables);
     plan.notes.insert(plan.notes.end(), report.notes.begin(), report.notes.end());
+    plan.approximations = std::move(report.approximations);
+    report_approximations(plan);
+}
+
+// ------------------------------------------------------------------------------------------- light
+
+// The rule for light inside a slab: the scene's, or the method's default.
+InsideRule inside_rule(Plan& plan) {
+    const std::optional<InsideRule>& asked = plan.scene.shading.inside;
+    const std::string_view method = name_of(plan.scene.classification.method);
+    if (!plan.lit) return InsideRule::front;
+    if (!plan.needs_back) {
+        if (asked)
+            plan.notes.push_back(
+                fmt::format("shading.inside = \"{}\" is ignored: {} has one sample a slab, which lights it",
+                            name_of(*asked), method));
+        return InsideRule::front;
+    }
+    const bool has_parts = std::visit([](const auto& m) { return !m.kPremultiplied; }, plan.method);
+    if (asked == InsideRule::adaptive && !has_parts)
+        throw InputError(fmt::format(
+            "{}: found \"adaptive\", but {} has no tables for parts of a slab; allowed: mean, front, middle, "
+            "or classification.method = \"pips\" or \"leg\"",
+            where(plan.scene, "shading.inside"), method));
+    return asked.value_or(InsideRule::mean);
 }
 
 // ----------------------------------------------------------------------- what is left out, and why
@@ -200,6 +227,7 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
     plan.real = rounds_nothing(precision.preset);
     plan.wants_depth = scene.output.depth;
     preset_specs(precision.preset, preset_inputs(plan), plan.specs);
+    keep_sums_exact(scene, plan.specs);
     if (!plan.real) apply_overrides(precision, plan.specs);  // `real` has no formats to be given others
     report_stages(plan);
     StageInputs in{.scene = plan.scene,
@@ -211,11 +239,13 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
                    .lit = plan.lit};
     plan.location = build_location(in);
     plan.interpolation = build_interpolation(in);
-    plan.gradient = build_gradient(in);
     plan.input = build_input(in);
     plan.to_average = rescale(in, fraction(in, Wire::classification_input), Wire::classification_input);
     plan_classification(plan);
     in.premultiplied = std::visit([](const auto& m) { return m.kPremultiplied; }, plan.method);
+    in.inside = inside_rule(plan);
+    plan.inside = build_inside(in, plan.location);
+    plan.gradient = build_gradient(in);
     plan.shading = build_shading(in);
     report_shading(plan);
     plan.compositing = build_compositing(in);
@@ -223,6 +253,7 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
     warn_of_lost_fog(plan);
     choose_words(plan);
     for (std::string& finding : findings_of(plan)) plan.warnings.push_back(std::move(finding));
+    warn_of_formats(plan);
     if (plan.real) set_active(plan, {});
     if (plan.float32) prepare_floats(plan);
     return plan;
@@ -259,6 +290,7 @@ void set_active(Plan& plan, const std::array<bool, kWires>& rounded) {
     plan.input.active = is(Wire::classification_input);
     plan.gradient.active = is(Wire::spacing);
     plan.shading.active = is(Wire::material);
+    plan.inside.to_whole.active = is(Wire::lit_color);
     plan.real = true;
 }
 

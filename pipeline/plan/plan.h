@@ -9,6 +9,7 @@
 #include "pipeline/classification/methods.h"
 #include "pipeline/stages/compositing.h"
 #include "pipeline/stages/gradient.h"
+#include "pipeline/stages/inside.h"
 #include "pipeline/stages/interpolation.h"
 #include "pipeline/stages/location.h"
 #include "pipeline/stages/shading.h"
@@ -51,16 +52,17 @@ struct Plan {
     InputStage input;
     ClassificationMethod method;
     ShadingStage shading;
+    InsideStage inside;
     CompositingStage compositing;
     bool lit = false;
     bool projection_mode = false;  // mip, minip, average
-    bool needs_back = false;       // slab methods take the samples at both ends
+    bool needs_back = false;       // slab methods classify by the samples at both ends
     int entry_reach = 0;           // entries beside a slab's own that its colour may come from
     // Inputs up to the one and from the other on are those of entries in which nothing is to be seen, nor in
     // any beside them: a slab with both its ends there is transparent.
     std::int64_t unseen_to = -1, unseen_from = std::numeric_limits<std::int32_t>::max();
     bool wants_depth = false;
-    Rescale to_average;             // average mode: sum of inputs over their number
+    Rescale to_average;             // average mode: sum of inputs over twice their length
     bool skips_empty_space = true;  // a transparent sample is the identity
 
     WordNeeds gradient_needs,
@@ -71,12 +73,19 @@ struct Plan {
         used_wires;  // that carry anything, in order: found by running the stages over intervals
     std::vector<StageReport> stages;
     std::vector<TableReport> tables;
-    std::vector<std::string> notes;     // what a user should know
-    std::vector<std::string> warnings;  // what a user should mend
+    std::vector<Approximation> approximations;  // what tables leave out
+    std::vector<std::string> notes;             // what a user should know
+    std::vector<std::string> warnings;          // what a user should mend
 
     RaySetup set_up(int column, int row) const;
     /// The preset whose words these are, where none is quantised.
     std::string real_name() const { return float32 ? "float32" : "real"; }
+    /// Slab methods and projections look at both ends of every slab, a ray's exit among them.
+    bool samples_both_ends() const { return needs_back || projection_mode; }
+    /// Gradients that light a slab, side by side.
+    int gradients_a_slab() const { return inside.rule == InsideRule::mean ? 2 : 1; }
+    /// Whether stage 3 wants samples' locations, not their cells alone.
+    bool keeps_locations() const { return gradient_from_samples() || (lit && inside.samples_between()); }
     bool gradient_from_samples() const { return lit && gradient.rule == GradientRule::central_samples; }
     Spec spec(Wire wire) const { return specs[wire]; }
 };
@@ -97,7 +106,7 @@ template <class V>
 void visit_stages(Plan& plan, V&& v) {
     plan.location.visit(v), plan.interpolation.visit(v), plan.gradient.visit(v), plan.input.visit(v);
     std::visit([&](auto& method) { method.visit(v); }, plan.method);
-    plan.shading.visit(v), plan.compositing.visit(v);
+    plan.inside.visit(v), plan.shading.visit(v), plan.compositing.visit(v);
 }
 
 }  // namespace squint

@@ -48,6 +48,8 @@ void leave_out_proven_limits(Plan& plan, const Slab<Range>& slab) {
     if (!plan.location.to_location.wraps) plan.location.to_location.limits = false;
     // A part of a cell is one at most.
     plan.location.to_weight.limits = false;
+    // A way from one place in the box to another.
+    for (Rescale& r : plan.inside.to_location) r.limits = false;
     // Form w: w = q(alpha T) <= T for alpha <= 1, so T never falls below 0.  c w rounds to w at most for c <=
     // 1, so C, a sum of such shares, never passes the sum of all w, which is 1 - T.  (Lit colours may
     // pass 1.)
@@ -60,9 +62,9 @@ void leave_out_proven_limits(Plan& plan, const Slab<Range>& slab) {
                            std::all_of(slab.color.begin(), slab.color.end(),
                                        [&](const Range& c) { return within_unit(c, s.color_fraction); });
     s.of_units = unit_slab;
-    if (s.form == CompositingForm::w && !s.premultiplied && unit_slab &&
+    if (s.takes_from_transparency() && !s.premultiplied && unit_slab &&
         s.contribution_fraction == s.transparency_fraction && color.integer_bits >= 1 &&
-        color.fraction_bits == s.contribution_fraction)
+        color.fraction_bits >= s.contribution_fraction)
         s.to_color.limits = s.to_color_sum.limits = s.to_transparency.limits = false;
 }
 

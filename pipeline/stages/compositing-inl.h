@@ -19,7 +19,28 @@ namespace squint::HWY_NAMESPACE {
 template <class W>
 HWY_INLINE Accumulated<W> nothing_yet(const CompositingStage& s) {
     const W zero = constant<W>(0);
-    return {{zero, zero, zero}, constant<W>(s.form == CompositingForm::alpha ? 0 : s.unit())};
+    return {{zero, zero, zero},
+            constant<W>(s.form == CompositingForm::alpha ? 0 : s.unit()),
+            constant<W>(s.first_remainder())};
+}
+/// Without rounding there is no remainder.
+template <RealWord W>
+HWY_INLINE Accumulated<W> nothing_yet(const CompositingStage& s) {
+    const W zero = constant<W>(0);
+    return {{zero, zero, zero},
+            constant<W>(s.form == CompositingForm::alpha ? 0 : s.unit()),
+            constant<W>(s.to_contribution.active ? s.first_remainder() : 0)};
+}
+
+/// w = alpha T: rounded, or with the remainder of the slabs before it and leaving its own.
+template <class W>
+HWY_INLINE W contribution(const CompositingStage& s, W alpha, Accumulated<W>& pixel) {
+    if (s.form == CompositingForm::w) return quantised_product(alpha, pixel.transparency, s.to_contribution);
+    const W sum = alpha * pixel.transparency + pixel.remainder;
+    const W w = quantise(sum, s.to_contribution);
+    const int shift = std::max(s.to_contribution.shift, 0);
+    if (shift > 0) pixel.remainder = within(sum - shift_left(w, shift), 0, (std::int64_t{1} << shift) - 1);
+    return w;
 }
 
 /// The transparency of what has been gathered.
@@ -68,8 +89,8 @@ template <class W>
 HWY_INLINE void composite(const CompositingStage& s, Accumulated<W>& pixel, std::array<W, 3> color, W alpha) {
     const W one = constant<W>(std::int64_t{1} << s.transparency_fraction);
     W& t = pixel.transparency;
-    if (s.form == CompositingForm::w) {
-        const W w = quantised_product(alpha, t, s.to_contribution);
+    if (s.takes_from_transparency()) {
+        const W w = contribution(s, alpha, pixel);
         for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
             const W share = quantised_product(color[c], s.premultiplied ? t : w, s.to_color);
             pixel.color[c] = quantise(pixel.color[c] + share, s.to_color_sum);

@@ -13,10 +13,24 @@ CompositingForm form_of(const Scene& scene) {
     return form == CompositingForm::automatic ? preset_form(resolved_precision(scene).preset) : form;
 }
 
+void keep_sums_exact(const Scene& scene, WireSpecs& specs) {
+    constexpr int kWidest = 29;  // a sum of two numbers of u1.29 fits a lane of 32 bits
+    if (form_of(scene) != CompositingForm::w_carry) return;
+    const auto fraction_bits = [&](Wire wire) { return specs[wire].format.fraction_bits; };
+    const int color = std::max(
+        {fraction_bits(Wire::slab_ratio), fraction_bits(Wire::slab_color), fraction_bits(Wire::lit_color)});
+    const int whole = color + std::max(fraction_bits(Wire::contribution), fraction_bits(Wire::transparency));
+    specs[Wire::color].format.fraction_bits = std::min(whole, kWidest);
+}
+
 CompositingStage build_compositing(const StageInputs& in) {
     CompositingStage s;
     s.form = form_of(in.scene);
-    if (!s.is_unit255()) require_integer_bits(in, Wire::transparency, 1, "a transparency of 1.0");
+    if (s.is_unit255())
+        require_fraction_bits(in, Wire::transparency, 1,
+                              "a transparency of 1.0, which is 2^F - 1 in this form,");
+    else
+        require_integer_bits(in, Wire::transparency, 1, "a transparency of 1.0");
     s.premultiplied = in.premultiplied;
     s.alpha_fraction = fraction(in, Wire::slab_alpha);
     const int unlit = s.premultiplied ? fraction(in, Wire::slab_color) : fraction(in, Wire::slab_ratio);
@@ -25,13 +39,21 @@ CompositingStage build_compositing(const StageInputs& in) {
     s.transparency_fraction = fraction(in, Wire::transparency);
     s.sum_fraction = fraction(in, Wire::color);
     const int t = s.transparency_fraction;
-    const bool carries_alpha = s.premultiplied || s.form == CompositingForm::w;
+    const bool carries_alpha = s.premultiplied || s.takes_from_transparency();
     s.to_slab_color = rescale(in, incoming + s.alpha_fraction, Wire::slab_color);
     s.color_fraction = carries_alpha ? incoming : fraction(in, Wire::slab_color);
     s.to_contribution = rescale(in, s.alpha_fraction + t, Wire::contribution);
+    if (s.form == CompositingForm::w_carry) {
+        require_integer_bits(in, Wire::contribution, 1, "an opacity of 1.0 in form w_carry");
+        // Nothing is rounded: the remainder is carried.
+        Spec floor = in.specs[Wire::contribution];
+        floor.rounding = Rounding::trn;
+        s.to_contribution = Rescale(s.alpha_fraction + t, floor, wire_index(Wire::contribution));
+    }
     s.to_color_sum = limits_of(in, Wire::color), s.to_transparency_sum = limits_of(in, Wire::transparency);
     switch (s.form) {
         case CompositingForm::w:
+        case CompositingForm::w_carry:
             s.to_color = rescale(in, incoming + (s.premultiplied ? t : s.contribution_fraction), Wire::color);
             s.to_transparency = rescale(in, std::max(t, s.contribution_fraction), Wire::transparency);
             break;

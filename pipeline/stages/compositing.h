@@ -1,6 +1,8 @@
 // Stage 6: compositing.  slab colour and opacity (1.F) -> pixel C and T (1.F).  Squeeze, sections 3 and 4.1.
 //
 //     w               w = q(alpha T);  T -= w;  C += c w       the default: C + T = 1 for white, one multiply fewer
+//     w_carry         w = floor((alpha T + r) / 2^F), r the remainder, carried to the next slab;  T -= w;  C += c w,
+//                     exact: ours, docs/compositing.md.  What rounding costs A does not grow with the slabs
 //     equation_9      C += C_s T;  T = q(T (1 - alpha))        Squeeze, equation 9
 //     alpha           C += C_s (1 - A);  A += q((1 - A) alpha) front to back with opacity
 //     back_to_front   C = C_s + q(C (1 - alpha))               Squeeze, equation 6
@@ -42,12 +44,25 @@ struct CompositingStage {
     bool is_unit255() const {
         return form == CompositingForm::unit255_shift || form == CompositingForm::unit255_blinn;
     }
+    /// The forms of w = alpha T.
+    bool takes_from_transparency() const {
+        return form == CompositingForm::w || form == CompositingForm::w_carry;
+    }
+    /// w_carry: what a pixel starts with, half of w's last bit in units of alpha T.
+    std::int64_t first_remainder() const {
+        return form == CompositingForm::w_carry && to_contribution.shift > 0
+                   ? std::int64_t{1} << (to_contribution.shift - 1)
+                   : 0;
+    }
     std::int64_t unit() const { return (std::int64_t{1} << transparency_fraction) - (is_unit255() ? 1 : 0); }
     std::int64_t color_unit() const { return is_unit255() ? unit() : std::int64_t{1} << sum_fraction; }
 };
 /// The stage's constants.  Throws InputError where the transparency's wire cannot hold one.
 CompositingStage build_compositing(const StageInputs& in);
 
+/// Form w_carry: the wire `color` gets all bits of the products that it adds, as far as a lane of 32 bits goes; nothing
+/// is ever multiplied by C.
+void keep_sums_exact(const Scene& scene, WireSpecs& specs);
 /// The form that a scene is composited by: its own, or its preset's.
 CompositingForm form_of(const Scene& scene);
 
@@ -56,6 +71,7 @@ template <class W>
 struct Accumulated {
     std::array<W, 3> color;
     W transparency;
+    W remainder{};  // w_carry: of alpha T, below w's last bit
 };
 
 }  // namespace squint

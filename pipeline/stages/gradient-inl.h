@@ -121,15 +121,39 @@ HWY_INLINE std::array<W, 3> normalise(const GradientStage& s, const std::array<W
     return normal;
 }
 
-/// Without rounding the definition itself will do.
+/// min(1, |g| / g_0) in 1.F, in integers: one where |g| >= g_0.  Error: 2^-13 of it where g_0 has more than
+/// kNormalBits bits, for what they drop must not leave a full length below one; plus half a last bit.
+template <class W>
+HWY_INLINE W confidence(const GradientStage& s, const std::array<W, 3>& gradient) {
+    std::array<W, 3> size;
+    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+        const W enough = min(absolute(gradient[a]), constant<W>(s.floor_raw));
+        size[a] =
+            within(s.floor_bits < 0 ? floor_shift(enough, -s.floor_bits) : shift_left(enough, s.floor_bits),
+                   0, (std::int64_t{1} << kNormalBits) - 1);
+    });
+    const W full = constant<W>(s.full_length);
+    return quotient(min(vector_length(size, kNormalGuard), full), full, s.to_confidence);
+}
+template <RealWord W>
+HWY_INLINE W confidence(const GradientStage& s, const std::array<W, 3>& g) {
+    const W length = square_root(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+    Rescale raw = s.to_confidence;
+    raw.shift = 0;
+    const W part = min(length / W::from(s.floor_exact), constant<W>(1));
+    return quantise(shift_left(part, s.confidence_fraction), raw);
+}
+
+/// Without rounding the definition itself will do, but for what is too short to be more than a rounding.
 template <RealWord W>
 HWY_INLINE std::array<W, 3> normalise(const GradientStage& s, const std::array<W, 3>& g) {
-    const W zero = constant<W>(0), length = square_root(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+    const W zero = constant<W>(0), shortest = W::from(s.vanishing);
+    const W length = square_root(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
     Rescale raw = s.to_normal;
     raw.shift = 0;
     const W scale = W::from(-power_of_two<double>(s.normal_fraction)) / length;
     const auto component = [&](std::size_t a) SQUINT_WRITTEN_OUT {
-        return select(zero < length, quantise(g[a] * scale, raw), zero);
+        return select(shortest < length, quantise(g[a] * scale, raw), zero);
     };
     return {component(0), component(1), component(2)};
 }

@@ -33,6 +33,16 @@ GradientStage build_gradient(const StageInputs& in) {
     s.normal_fraction = fraction(in, Wire::normal);
     s.to_normal = Rescale(-kNormalGuard, in.specs[Wire::normal], wire_index(Wire::normal));
     s.to_normal.divides = true;
+    const auto one = static_cast<double>(in.specs[Wire::gradient].format.one());
+    s.vanishing = kVanishing * static_cast<double>(v.largest - v.smallest) * one;
+    s.confidence_fraction = fraction(in, Wire::confidence);
+    s.to_confidence = Rescale(0, in.specs[Wire::confidence], wire_index(Wire::confidence));
+    s.to_confidence.divides = true;
+    if (const double floor = in.scene.shading.gradient_floor; in.lit && floor > 0) {
+        require_integer_bits(in, Wire::confidence, 1, "a confidence of 1.0");
+        // The sum of a slab's two gradients is twice as long as their mean.
+        fade_in_up_to(s, (in.inside == InsideRule::mean ? 2 : 1) * floor * one);
+    }
     return s;
 }
 

@@ -7,7 +7,11 @@
 #include "fixedpoint/words.h"
 #include "scene/scene.h"
 
+#include <algorithm>
 #include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
 
 namespace squint {
 
@@ -27,10 +31,21 @@ struct GradientStage {
     bool active = true;
     Rescale to_normal;  // quotient of a component and the length
     int normal_fraction = 0;
+    // Real: below this, in raw units, a gradient is zero.  A rounding alone can leave it 1e-13 long, and
+    // normalised that is a full normal where the field is flat.
+    double vanishing = 0;
+    // Light that fades in up to |g| = g_0.  Components up to g_0, shifted so that it has kNormalBits bits.
+    bool fades = false;
+    double floor_exact = 0;        // g_0 in raw units
+    std::int64_t floor_raw = 0;    // its floor
+    int floor_bits = 0;            // shifted left by; negative: right
+    std::int64_t full_length = 0;  // from which on confidence is one, with kNormalGuard fraction bits
+    int confidence_fraction = 0;
+    Rescale to_confidence;
 
     template <class V>
     void visit(V&& v) {
-        v(to_first), v(to_second), v(to_gradient), v(to_scaled), v(to_normal);
+        v(to_first), v(to_second), v(to_gradient), v(to_scaled), v(to_normal), v(to_confidence);
     }
 };
 /// The stage's constants.  Throws InputError where a wire is unsigned and the scene is lit.
@@ -38,6 +53,20 @@ GradientStage build_gradient(const StageInputs& in);
 
 /// Bits that normalising keeps of the largest component, and fraction bits it gives the length.
 inline constexpr int kNormalBits = 15, kNormalGuard = 8;
+
+/// A gradient below this part of the data's range, in levels per smallest voxel spacing, is zero in doubles.
+inline constexpr double kVanishing = 0x1p-40;
+
+/// Lets light fade in up to gradients of `length`, in raw units and above 0.
+inline void fade_in_up_to(GradientStage& s, double length) {
+    s.fades = true;
+    s.floor_exact = length;
+    s.floor_raw = std::max<std::int64_t>(1, static_cast<std::int64_t>(std::floor(length)));
+    s.floor_bits = kNormalBits - static_cast<int>(std::bit_width(static_cast<std::uint64_t>(s.floor_raw)));
+    // Dropped bits take less than one from each component, and less than two from the length.
+    s.full_length = s.floor_bits < 0 ? ((s.floor_raw >> -s.floor_bits) - 2) << kNormalGuard
+                                     : s.floor_raw << s.floor_bits << kNormalGuard;
+}
 
 /// The 4x4x4 voxels about a cell, the cell's corners in the middle; x fastest.  Clamped at the volume's
 /// faces.

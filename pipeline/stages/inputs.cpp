@@ -32,6 +32,12 @@ void require_integer_bits(const StageInputs& in, Wire wire, int bits, const std:
                                      to_string(f), f.integer_bits, what, bits));
 }
 
+void require_fraction_bits(const StageInputs& in, Wire wire, int bits, const std::string& what) {
+    const Format& f = in.specs[wire].format;
+    if (f.fraction_bits < bits)
+        throw InputError(fmt::format("precision.{}: {} has {} fraction bits, but {} needs {}",
+                                     info(wire).name, to_string(f), f.fraction_bits, what, bits));
+}
 void require_signed(const StageInputs& in, Wire wire) {
     if (!in.specs[wire].format.is_signed)
         throw InputError(

@@ -21,6 +21,7 @@ struct StageInputs {
     double most_steps = 1;       // slabs of the longest ray; not rounded to whole ones
     bool lit = false;            // whether stages 3 and 5 run
     bool premultiplied = false;  // whether slabs' colours carry their opacity: the classification's
+    InsideRule inside = InsideRule::front;  // where a slab's light is taken
 };
 
 /// A Rescale of numbers with `from_fraction` fraction bits to a wire.
@@ -38,6 +39,8 @@ int bits_for(double value);
 
 /// Throws InputError, naming the wire, where its format has fewer than `bits` integer bits, which `what` needs.
 void require_integer_bits(const StageInputs& in, Wire wire, int bits, const std::string& what);
+/// The same for fraction bits.
+void require_fraction_bits(const StageInputs& in, Wire wire, int bits, const std::string& what);
 /// Throws InputError, naming the wire, where its format is unsigned.
 void require_signed(const StageInputs& in, Wire wire);
 

@@ -27,7 +27,7 @@ HWY_INLINE W lerp(W v0, W v1, W weight, int weight_bits, const Rescale& to) {
 template <class W, class C>
 HWY_INLINE W interpolate(const InterpolationStage& s, const C& cell, const std::array<W, 3>& weight) {
     if (s.nearest) {
-        const W half = constant<W>(std::int64_t{1} << (s.weight_bits - 1));
+        const W half = constant<W>(std::int64_t{1} << std::max(s.weight_bits - 1, 0));
         const auto pick = [&](W near, W far, std::size_t axis) {
             return select(weight[axis] < half, near, far);
         };

@@ -74,8 +74,8 @@ requires requires {
     typename W::IsReal;
 }
 W word_from(double value, const Spec& spec, const Rescale& to) {
-    return W::from(to.active ? static_cast<double>(quantise_real(value, spec))
-                             : value * static_cast<double>(spec.format.one()));
+    return to.active ? W::from(static_cast<double>(quantise_real(value, spec)))
+                     : quantise(W::from(value * static_cast<double>(spec.format.one())), to);
 }
 template <class W>
 requires std::same_as<W, Audited> W word_from(double value, const Spec& spec, const Rescale& to) {

@@ -11,6 +11,28 @@
 #include <cmath>
 
 namespace squint {
+namespace {
+
+GoochTones build_gooch(const StageInputs& in) {
+    GoochTones g;
+    const ShadingSettings& settings = in.scene.shading;
+    const Spec material = in.specs[Wire::material];
+    g.cool_to_light = settings.cool_side == CoolSide::light;
+    g.share_exact = {settings.kd * settings.cool_share, settings.kd * settings.warm_share};
+    for (std::size_t side = 0; side < 2; ++side) {
+        g.share[side] = quantise_real(g.share_exact[side], material);
+        for (int channel = 0; channel < 3; ++channel) {
+            const auto c = static_cast<std::size_t>(channel);
+            g.tone_exact[c][side] = side == 0 ? settings.cool[channel] : settings.warm[channel];
+            g.tone[c][side] = quantise_real(g.tone_exact[c][side], material);
+        }
+    }
+    g.to_faded = rescale(in, fraction(in, Wire::dot) + fraction(in, Wire::confidence), Wire::dot);
+    g.to_side = rescale(in, fraction(in, Wire::dot) + 1, Wire::intensity);
+    return g;
+}
+
+}  // namespace
 
 ShadingStage build_shading(const StageInputs& in) {
     if (in.lit)
@@ -44,8 +66,11 @@ ShadingStage build_shading(const StageInputs& in) {
     s.material = {settings.ka, settings.kd, settings.ks};
     s.ka = quantise_real(settings.ka, material), s.kd = quantise_real(settings.kd, material),
     s.ks = quantise_real(settings.ks, material);
+    s.exponent = settings.exponent;
     s.squarings = static_cast<int>(std::bit_width(static_cast<std::uint64_t>(settings.exponent))) - 1;
-    if (settings.power == PowerRule::squaring && settings.exponent != std::ldexp(1.0, s.squarings))
+    const bool is_cone = settings.model == ShadingModel::cone;
+    if (!is_cone && settings.power == PowerRule::squaring &&
+        settings.exponent != std::ldexp(1.0, s.squarings))
         throw InputError(
             fmt::format("shading.exponent: {} is not a power of two, which shading.power = \"squaring\" "
                         "needs; use {} or power = \"table\"",
@@ -54,8 +79,9 @@ ShadingStage build_shading(const StageInputs& in) {
     const int slope_bits = settings.exponent == std::floor(settings.exponent)
                                ? 1
                                : std::min(21, 32 - bits_for(settings.exponent + 2));
-    s.parabola_slope =
-        static_cast<std::int64_t>(std::floor(std::ldexp((settings.exponent + 1) / 2, slope_bits) + 0.5));
+    const double slope =
+        is_cone && settings.cone_slope == ConeSlope::paper ? settings.exponent : (settings.exponent + 1) / 2;
+    s.parabola_slope = static_cast<std::int64_t>(std::floor(std::ldexp(slope, slope_bits) + 0.5));
     s.power_table_bits = std::min(10, s.power_fraction);
     if (settings.power == PowerRule::table) {
         // 1024 rows, linear between them: error p^2 / 8 / 2^20 for exponent p.
@@ -66,6 +92,9 @@ ShadingStage build_shading(const StageInputs& in) {
                               in.specs[Wire::power]);
     }
     s.power_table.wire = wire_index(Wire::power);
+    s.fades = in.lit && settings.gradient_floor > 0;
+    s.to_faded = rescale(in, s.intensity_fraction + fraction(in, Wire::confidence), Wire::intensity);
+    s.gooch = build_gooch(in);
     s.to_light = rescale(in, s.light_fraction, Wire::light);
     s.to_dot = rescale(in, s.normal_fraction + s.light_fraction, Wire::dot);
     s.to_light_view = rescale(in, 2 * s.light_fraction, Wire::dot);

@@ -14,6 +14,31 @@ namespace squint {
 
 struct StageInputs;
 
+/// Models of shading, a file each below shading/; shading-inl.h lists them.
+struct Phong {
+    static constexpr bool kHeldToOpacity = false;
+};
+struct BlinnPhong {
+    static constexpr bool kHeldToOpacity = false;
+};
+struct Cone {
+    static constexpr bool kHeldToOpacity = false;
+};
+struct Gooch {
+    static constexpr bool kHeldToOpacity = true;
+};
+
+/// What Gooch's model has of its own, first of the cool side, then of the warm one; raw in the material
+/// format, and exact.
+struct GoochTones {
+    bool cool_to_light = false;
+    std::array<std::int64_t, 2> share{};  // of the matter's colour
+    std::array<std::array<std::int64_t, 2>, 3> tone{};
+    std::array<double, 2> share_exact{};
+    std::array<std::array<double, 2>, 3> tone_exact{};
+    Rescale to_faded, to_side;
+};
+
 struct ShadingStage {
     ShadingModel model = ShadingModel::none;
     PowerRule power = PowerRule::squaring;
@@ -22,6 +47,7 @@ struct ShadingStage {
     int color_fraction = 0;      // of the slab's colour, and of alpha where premultiplied
     bool white = true;           // every light is white: one sum serves all three colours
     bool two_sided = false;
+    bool fades = false;         // confidence weighs what the lights add to ambient light
     bool half_per_ray = false;  // perspective, or Phong's reflected view: the words come with the ray
     int light_fraction = 0, normal_fraction = 0, dot_fraction = 0, power_fraction = 0, intensity_fraction = 0,
         material_fraction = 0;
@@ -32,13 +58,15 @@ struct ShadingStage {
     std::array<double, 3> material{};                    // the same, exact
     std::array<std::array<double, 3>, kMostLights> light_exact{}, half_exact{}, color_exact{};
     bool active = true;  // Real: constants rounded or exact
+    double exponent = 1;
     int squarings = 0;
     std::int64_t parabola_slope = 0;  // 2 (exponent + 1) / 2: keeps the lobe's energy; one fraction bit
     Table power_table;                // power rule `table`: 2^b + 1 rows over the dot's range
     int power_table_bits = 0;
+    GoochTones gooch;
     Rescale to_light_view;  // Phong: L.V
     Rescale to_dot, to_reflected, to_power_input, to_power, to_power_lerp, to_fall, to_diffuse_sum,
-        to_specular_sum, to_diffuse, to_specular, to_lit;
+        to_specular_sum, to_faded, to_diffuse, to_specular, to_lit;
     Rescale to_light;  // per-ray half and view vectors on their way to words
     Spec light_spec;
 
@@ -46,10 +74,12 @@ struct ShadingStage {
     void visit(V&& v) {
         for (Rescale* r :
              {&to_light_view, &to_dot, &to_reflected, &to_power_input, &to_power, &to_power_lerp, &to_fall,
-              &to_diffuse_sum, &to_specular_sum, &to_diffuse, &to_specular, &to_lit, &to_light})
+              &to_diffuse_sum, &to_specular_sum, &to_faded, &to_diffuse, &to_specular, &to_lit, &to_light})
             v(*r);
-        v(power_table);
+        v(gooch.to_faded), v(gooch.to_side), v(power_table);
     }
+    /// Whether words of its own come with each ray.
+    bool needs_ray() const { return half_per_ray || model == ShadingModel::phong; }
 };
 /// The stage's constants.  Throws InputError for an exponent that its power rule cannot have, and where a wire is unsigned
 /// and the scene is lit.

@@ -87,7 +87,7 @@ class Evaluator {
     std::vector<std::string> images_by_age_;
 };
 
-/// "u1.12 rnd_conv sat" with one part changed.  Throws InputError where the bits leave 0 to 24.
+/// "u1.12 rnd_conv sat" with one part changed.  Throws InputError where the bits are more than a format has.
 Spec edited(Spec spec, const WireEdit& edit);
 
 /// Version, and a hash of the running program: what a record was made by.

@@ -71,7 +71,7 @@ TEST(Presets, DefaultFollowsTheStepWhereThirtyTwoBitsHoldNoMore) {
     EXPECT_EQ(bits(0.25, 11), 20);
     EXPECT_EQ(bits(0.25, 4), 15);
     EXPECT_EQ(bits(1, 13), 22);
-    EXPECT_EQ(bits(0.001, 20), kMostFractionBits);
+    EXPECT_EQ(bits(0.001, 20), kMostChosenFractionBits);
     WireSpecs w;
     ASSERT_TRUE(preset_specs("default", {.ray_bits = 11, .total_depth_bits = 5, .step = 0.25}, w));
     for (const Wire wire :

@@ -109,7 +109,7 @@ TEST(SweepFile, SaysInOneLineWhatIsWrongAndWhere) {
     EXPECT_THAT(refusal("[[axis]]\nwires = ['colour']\nfraction_bits = [8]\n"),
                 HasSubstr("did you mean \"color\"?"));
     EXPECT_THAT(refusal("[[axis]]\nwires = ['color']\nfraction_bits = [25]\n"),
-                HasSubstr("allowed: a whole number from 0 to 24"));
+                HasSubstr("allowed: a whole number from 0 to 29"));
     EXPECT_THAT(refusal("[[axis]]\nkey = 'sampling.step'\nvalues = []\n"), HasSubstr("at least one value"));
     EXPECT_THAT(refusal("[[axis]]\nkey = 'sampling.step'\nrange = { from = 1, to = 2, step = -1 }\n"),
                 HasSubstr("leads from"));

@@ -5,6 +5,7 @@
 #include "core/procedural.h"
 #include "pipeline/render.h"
 #include "tests/truth/reference_cases.h"
+#include "truth/reference_light.h"
 
 #include <gtest/gtest.h>
 
@@ -343,6 +344,45 @@ TEST(Reference, ThePowerRulesAreTheirFormulas) {
     }
 }
 
+TEST(Reference, AConeHasTheSlopeOfItsEnergyOrThePapers) {
+    const auto volume = slope(Vec3(1));
+    Scene scene = plain_scene();
+    scene.clip.low = Vec3(1), scene.clip.high = Vec3(6);
+    look(scene, *volume, Vec3(1, 2, 2));
+    scene.lights = {{.headlight = true}};
+    const double dot = Vec3(20, 30, 40).normalized().dot(Vec3(1, 2, 2).normalized());  // N.H, and N.L
+    scene.shading = {.model = ShadingModel::cone, .ka = 0, .kd = 0.25, .ks = 0.5, .exponent = 13};
+    auto pixel = reference_pixel(make_plan(scene, volume), 0, 0);
+    EXPECT_NEAR(pixel[0], pixel[3] * (0.25 * dot + 0.5 * (1 - 7 * (1 - dot))), kPromise);
+    scene.shading.cone_slope = ConeSlope::paper;
+    pixel = reference_pixel(make_plan(scene, volume), 0, 0);
+    EXPECT_NEAR(pixel[0], pixel[3] * (0.25 * dot + 0.5 * (1 - 13 * (1 - dot))), kPromise);
+}
+
+TEST(Reference, GoochGoesFromCoolToWarmAndNoFartherThanTheOpacity) {
+    const auto volume = slope(Vec3(1));
+    Scene scene = plain_scene();
+    scene.clip.low = Vec3(1), scene.clip.high = Vec3(6);
+    scene.transfer_function.points = {{0, 0.5, 0.25, 1, 0.2}};
+    look(scene, *volume, Vec3(1, 2, 2));
+    scene.lights = {{.headlight = true}};
+    const double dot = Vec3(20, 30, 40).normalized().dot(Vec3(1, 2, 2).normalized());
+    scene.shading.model = ShadingModel::gooch, scene.shading.kd = 0.5;
+    const Vec3 color(0.5, 0.25, 1), cool = color * 0.1 + Vec3(0, 0, 0.55),
+                                    warm = color * 0.3 + Vec3(0.3, 0.3, 0);
+    for (const CoolSide side : {CoolSide::shadow, CoolSide::light}) {
+        scene.shading.cool_side = side;
+        const double to_warm = (side == CoolSide::shadow ? 1 + dot : 1 - dot) / 2;
+        const auto pixel = reference_pixel(make_plan(scene, volume), 0, 0);
+        for (int c = 0; c < 3; ++c)
+            EXPECT_NEAR(pixel[static_cast<std::size_t>(c)],
+                        pixel[3] * (warm[c] * to_warm + cool[c] * (1 - to_warm)), kPromise);
+    }
+    scene.shading.cool = scene.shading.warm = Vec3(1), scene.shading.kd = 1;
+    const auto pixel = reference_pixel(make_plan(scene, volume), 0, 0);
+    for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(pixel[c], pixel[3], kPromise);
+}
+
 TEST(Reference, AFlatFieldGetsAmbientLightOnly) {
     const auto volume = volume_of({4, 4, 4}, 8, Vec3(1), [](const Index3&) { return 9; });
     for (const ShadingModel model : {ShadingModel::phong, ShadingModel::blinn_phong}) {
@@ -352,6 +392,42 @@ TEST(Reference, AFlatFieldGetsAmbientLightOnly) {
         look(scene, *volume, Vec3(0.1, 1, 0.2));
         const auto pixel = reference_pixel(make_plan(scene, volume), 0, 0);
         EXPECT_NEAR(pixel[0], 0.25 * pixel[3], kPromise);
+    }
+}
+
+// The gradient of slope() is (20, 15, 80) levels a unit at this spacing, and a unit is two smallest spacings.
+TEST(Reference, LightFadesInUpToTheFloorOfGradients) {
+    const Vec3 spacing(1, 2, 0.5);
+    const auto volume = slope(spacing);
+    const double length = Vec3(20, 15, 80).length() / 2;
+    Scene scene = plain_scene();
+    scene.clip.low = spacing, scene.clip.high = spacing * 6;
+    scene.lights = {{.direction = Vec3(-20, -15, -80)}};
+    scene.shading = {.ka = 0.25, .kd = 0.5, .ks = 0.125, .exponent = 1};
+    for (const GradientRule rule : {GradientRule::central, GradientRule::central_samples,
+                                    GradientRule::analytic, GradientRule::sobel}) {
+        scene.shading.gradient = rule;
+        look(scene, *volume, Vec3(20, 15, 80));  // N, L and H agree
+        for (const double floor : {0.0, length / 2, length * (1 - 1e-12), 2 * length, 8 * length}) {
+            scene.shading.gradient_floor = floor;
+            const auto pixel = reference_pixel(make_plan(scene, volume), 0, 0);
+            const double certain = floor > length ? length / floor : 1;
+            EXPECT_NEAR(pixel[0], pixel[3] * (0.25 + certain * 0.625), kPromise) << floor;
+        }
+    }
+}
+
+TEST(Reference, AGradientOfARoundingIsNone) {
+    const auto volume = slope(Vec3(1));  // scalars 100 to 730
+    Scene scene = plain_scene();
+    scene.lights = {{.direction = Vec3(0, 0, 1)}};
+    scene.shading = {.ka = 0.25, .kd = 0.5, .ks = 0.125};
+    const Plan plan = make_plan(scene, volume);
+    const reference::RayLight light(scene, *volume, plan.camera, Vec3(0, 0, -1));
+    EXPECT_EQ(light(Vec3(0, 0, -630 * 0x1.01p-40)).diffuse.x, 0.75);
+    for (const double length : {0.0, 1e-13, 630 * 0x0.ffp-40}) {
+        EXPECT_EQ(light(Vec3(0, 0, -length)).diffuse.x, 0.25);
+        EXPECT_EQ(light(Vec3(0, 0, -length)).specular.x, 0);
     }
 }
 

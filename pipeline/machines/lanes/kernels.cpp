@@ -49,6 +49,7 @@ StageKernels kernels_for(const Plan& plan, const StageWays& ways, const VoxelSou
     voxel_kernels(target, source, kernels);
     classification_kernel(target, plan, ways.classification, kernels);
     shading_kernels(target, plan, ways, kernels);
+    inside_kernels(target, ways, kernels);
     compositing_kernel(target, plan, ways.compositing, kernels);
     projection_kernel(target, plan, kernels);
     return kernels;

@@ -46,6 +46,22 @@ struct StageKernels {
     void (*hide)(const Plan&, const RayPacket&, const PixelPacket&, int steps, Samples&) = nullptr;
     /// Of slabs [0, steps): those in which something is to be seen, packed.  Gives their number.
     int (*gather_lit)(const Plan&, const RayPacket&, int steps, const Samples&, LitSamples&) = nullptr;
+    /// Where slabs are lit in pieces: the ends of slabs that may be cut, in rows
+    /// [0, steps], each once.  Gives their number.
+    int (*gather_ends)(const Plan&, const RayPacket&, int steps, const Samples&, LitSamples& ends) = nullptr;
+    /// Places `part` 2^-bits of the way along gathered slabs [at, at + count), to places from `to` on.
+    void (*place_between)(const Plan&, const LitSamples& slabs, int at, int count, int part, int bits,
+                          LitSamples& places, int to) = nullptr;
+    /// Raw gradients alone, of one place each.
+    void (*find_gradients)(const Plan&, int count, LitSamples&) = nullptr;
+    /// log2 of the pieces of gathered slabs, from the raw gradients at their ends, by place in the batch.
+    void (*find_cuts)(const Plan&, int count, const Batch (&gradient)[3], LitSamples&) = nullptr;
+    /// Of gathered slabs those with so many cuts, and their number; up to the next sixteen the last again.
+    int (*pick_by_cuts)(const Plan&, int count, int cuts, const LitSamples&, LitSamples& picked) = nullptr;
+    /// Sixteen slabs from `at` on in 2^bits pieces, row i piece i, ready to be classified.
+    void (*cut)(const Plan&, const LitSamples& slabs, int at, int bits, Samples&) = nullptr;
+    /// Their pieces, lit, back to one colour each.
+    void (*join)(const Plan&, const LitSamples& pieces, int bits, LitSamples& slabs, int at) = nullptr;
     /// The voxels about the first `count` gathered samples, as many as the gradient's rule wants.
     void (*fetch_lit)(const Plan&, int count, LitSamples&) = nullptr;
     /// In place of fetch_lit for gradients from samples.  Rows [0, rows) of 16 gathered samples each: one
@@ -98,6 +114,7 @@ void sampling_kernels(std::int64_t target, const Plan& plan, const StageWays& wa
 void voxel_kernels(std::int64_t target, const VoxelSource& source, StageKernels& kernels);
 void classification_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);
 void shading_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels);
+void inside_kernels(std::int64_t target, const StageWays& ways, StageKernels& kernels);
 void compositing_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);
 void projection_kernel(std::int64_t target, const Plan& plan, StageKernels& kernels);
 

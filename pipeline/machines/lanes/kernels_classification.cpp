@@ -98,9 +98,9 @@ void classify_paired_entries(const Plan& plan, int steps, lanes::Samples& sample
             store_slab<L>({{zero, zero, zero}, zero}, at, samples);
             continue;
         }
-        const EntryPosition<L> place = entry_position(spacing, input);
-        const std::array<L, 4> between =
-            lerp_paired_rows(rows, place.entry, place.fraction, spacing.input_fraction, to_color, to_alpha);
+        const EntryPosition<L> place = sub_entry_position(spacing, spacing.row_bits, input);
+        const std::array<L, 4> between = lerp_paired_rows(
+            rows, place.entry, place.fraction, spacing.input_fraction - spacing.row_bits, to_color, to_alpha);
         Slab<L> slab{{between[0], between[1], between[2]}, between[EntryLookup::alpha]};
         if (any((length < full) | !(slab.alpha < least_opaque)))
             slab = classify_point(entries, input, length);

@@ -49,7 +49,8 @@ void composite_rows(const Plan& plan, const lanes::RayPacket& packet, int steps,
     for (int r = 0; r < lanes::kRays; r += static_cast<int>(L::count())) {
         Accumulated<L> pixel{
             {load<L>(pixels.color[0].v + r), load<L>(pixels.color[1].v + r), load<L>(pixels.color[2].v + r)},
-            load<L>(pixels.transparency.v + r)};
+            load<L>(pixels.transparency.v + r),
+            load<L>(pixels.remainder.v + r)};
         const L slabs = load_whole<L>(packet.slabs.v + r);
         auto active = zero < load_whole<L>(pixels.active.v + r);
         L count = load_whole<L>(pixels.samples.v + r);
@@ -75,11 +76,13 @@ void composite_rows(const Plan& plan, const lanes::RayPacket& packet, int steps,
                 pixel.color[c] = select(here, next.color[c], pixel.color[c]);
             });
             pixel.transparency = select(here, next.transparency, pixel.transparency);
+            pixel.remainder = select(here, next.remainder, pixel.remainder);
             if (!backwards) active = here & goes_on(stage, pixel);
         }
         keep_transparency(backwards ? 0 : steps);
         for_three([&](std::size_t c) SQUINT_WRITTEN_OUT { store(pixel.color[c], pixels.color[c].v + r); });
         store(pixel.transparency, pixels.transparency.v + r);
+        store(pixel.remainder, pixels.remainder.v + r);
         store_whole(count, pixels.samples.v + r);
         store_whole(select(active, one, zero), pixels.active.v + r);
     }
@@ -93,7 +96,7 @@ void hide_rows(const Plan& plan, const lanes::RayPacket& packet, const lanes::Pi
     if constexpr (kPlain) take_as_plain(stage);
     const L zero = constant<L>(0);
     for (int r = 0; r < lanes::kRays; r += static_cast<int>(L::count())) {
-        L transparency = load<L>(pixels.transparency.v + r);
+        L transparency = load<L>(pixels.transparency.v + r), remainder = load<L>(pixels.remainder.v + r);
         const L slabs = load_whole<L>(packet.slabs.v + r);
         auto active = zero < load_whole<L>(pixels.active.v + r);
         for (int step = 0; step < steps; ++step) {
@@ -101,9 +104,10 @@ void hide_rows(const Plan& plan, const lanes::RayPacket& packet, const lanes::Pi
             const auto here = active & (constant<L>(samples.first + step) < slabs);
             const L alpha = load<L>(samples.alpha.v + at);
             store(select(here, alpha, zero), samples.alpha.v + at);
-            Accumulated<L> next{{zero, zero, zero}, transparency};
+            Accumulated<L> next{{zero, zero, zero}, transparency, remainder};
             composite(stage, next, {zero, zero, zero}, alpha);
             transparency = next.transparency = select(here, next.transparency, transparency);
+            remainder = select(here, next.remainder, remainder);
             active = here & goes_on(stage, next);
         }
     }
@@ -126,7 +130,8 @@ void store_colors(const Plan& plan, const lanes::PixelPacket& pixels, const lane
         const std::array<Reals, 4> values = color_of(
             plan.compositing,
             Accumulated<Reals>{{value(pixels.color[0]), value(pixels.color[1]), value(pixels.color[2])},
-                               value(pixels.transparency)});
+                               value(pixels.transparency),
+                               Reals(0)});
         for (std::size_t c = 0; c < 4; ++c)
             hn::StoreU(hn::DemoteTo(narrow, values[c].v), narrow, color[c].v + r);
     }

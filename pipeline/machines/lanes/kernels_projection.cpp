@@ -22,26 +22,31 @@ void extreme_of_rows(const lanes::RayPacket& packet, int steps, const lanes::Sam
         const L slabs = load<L>(packet.slabs.v + r);
         L extreme = load<L>(projection.extreme.v + r);
         for (int row = 0; row < steps; ++row) {
-            const L input = load<L>(samples.input.v + row * kRays + r);
-            const L next = kLargest ? max(extreme, input) : min(extreme, input);
+            const L front = load<L>(samples.input.v + row * kRays + r),
+                    back = load<L>(samples.input.v + (row + 1) * kRays + r);
+            const L next = kLargest ? max(extreme, max(front, back)) : min(extreme, min(front, back));
             extreme = select(constant<L>(samples.first + row) < slabs, next, extreme);
         }
         store(extreme, projection.extreme.v + r);
     }
 }
 
-/// 16 million inputs of 31 bits, as many as a ray may have, fit 64 bits.
+/// 16 million sums of two inputs of 31 bits, as many as a ray may have, fit 64 bits.
 void sum_of_rows(const lanes::RayPacket& packet, int steps, const lanes::Samples& samples,
                  lanes::ProjectionPacket& projection) {
     using L = Lanes<std::int64_t>;
     const hn::ScalableTag<std::int64_t> d;
     for (int r = 0; r < kRays; r += static_cast<int>(L::count())) {
-        const L slabs = load<L>(packet.slabs.v + r), zero = constant<L>(0);
-        L sum{hn::Load(d, projection.sum + r)};
-        for (int row = 0; row < steps; ++row)
-            sum = sum + select(constant<L>(samples.first + row) < slabs,
-                               load<L>(samples.input.v + row * kRays + r), zero);
-        hn::Store(sum.v, d, projection.sum + r);
+        const L last = load<L>(packet.slabs.v + r) - constant<L>(1), zero = constant<L>(0);
+        L sum{hn::Load(d, projection.sum + r)}, last_ends{hn::Load(d, projection.last_ends + r)};
+        for (int row = 0; row < steps; ++row) {
+            const L k = constant<L>(samples.first + row);
+            const L ends =
+                load<L>(samples.input.v + row * kRays + r) + load<L>(samples.input.v + (row + 1) * kRays + r);
+            sum = sum + select(k < last, ends, zero);
+            last_ends = select(k == last, ends, last_ends);
+        }
+        hn::Store(sum.v, d, projection.sum + r), hn::Store(last_ends.v, d, projection.last_ends + r);
     }
 }
 

@@ -169,7 +169,7 @@ void interpolate_rows(const Plan& plan, int from, int to, lanes::Samples& sample
 
 void sampling_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::StageKernels& kernels) {
     lanes::with_word<Lanes, KnownRescales::halves_up>(ways.location, [&]<class L>() {
-        kernels.locate = plan.gradient_from_samples() ? &locate_rows<L, true> : &locate_rows<L, false>;
+        kernels.locate = plan.keeps_locations() ? &locate_rows<L, true> : &locate_rows<L, false>;
         kernels.step_aside = &step_rows_aside<L>;
     });
     lanes::with_word<Lanes, KnownRescales::halves_up>(ways.interpolation, [&]<class L>() {

@@ -35,14 +35,14 @@ struct StoredNeighbourhood {
 
 /// The default's gradient: central differences of voxels below 2^15.
 bool is_plain(const GradientStage& s, const Volume& volume) {
-    return s.rule == GradientRule::central && volume.largest < 1 << 15 && s.weight_bits <= 14 &&
+    return s.rule == GradientRule::central && !s.fades && volume.largest < 1 << 15 && s.weight_bits <= 14 &&
            s.to_normal.rounding == Rounding::rnd_conv && lanes::drops_bits(s.to_first) &&
            lanes::drops_bits(s.to_second) && lanes::drops_bits(s.to_gradient) && s.to_scaled.shift > 0 &&
            (s.isotropic || !s.to_scaled.limits);
 }
 /// Says so to the compiler.
 HWY_INLINE void take_as_plain(GradientStage& s) {
-    s.rule = GradientRule::central, s.to_normal.rounding = Rounding::rnd_conv;
+    s.rule = GradientRule::central, s.fades = false, s.to_normal.rounding = Rounding::rnd_conv;
     for (Rescale* to : {&s.to_first, &s.to_second, &s.to_gradient, &s.to_scaled})
         lanes::take_as_dropping_bits(*to);
     if (s.weight_bits > 14) __builtin_unreachable();
@@ -99,7 +99,7 @@ template <class G, class L, bool kPlain>
 void find_normals(const Plan& plan, int count, lanes::LitSamples& lit) {
     GradientStage stage = plan.gradient;
     if constexpr (kPlain) take_as_plain(stage);
-    const bool both_ends = plan.needs_back;
+    const bool both_ends = plan.gradients_a_slab() == 2;
     const auto slab_gradient = [&]<class W>(WordTag<W>, int at) SQUINT_WRITTEN_OUT {
         std::array<W, 3> gradient = stored_gradient<W, kPlain>(stage, lit, 0, at);
         if (both_ends) {
@@ -126,6 +126,18 @@ void find_normals(const Plan& plan, int count, lanes::LitSamples& lit) {
             gradient = slab_gradient(WordTag<L>{}, at);
         const std::array<L, 3> normal = normalise(stage, gradient);
         for (std::size_t a = 0; a < 3; ++a) store(normal[a], lit.normal[a].v + at);
+        if (stage.fades) store(confidence(stage, gradient), lit.confidence.v + at);
+    }
+}
+
+/// Raw gradients alone, as 32-bit words.
+template <class G, bool kPlain>
+void find_gradients(const Plan& plan, int count, lanes::LitSamples& lit) {
+    GradientStage stage = plan.gradient;
+    if constexpr (kPlain) take_as_plain(stage);
+    for (int at = 0; at < count; at += static_cast<int>(G::count())) {
+        const std::array<G, 3> gradient = stored_gradient<G, kPlain>(stage, lit, 0, at);
+        for (std::size_t a = 0; a < 3; ++a) store(gradient[a], lit.gradient[a].v + at);
     }
 }
 
@@ -135,7 +147,7 @@ bool is_plain(const ShadingStage& s) {
     const bool is_clamped = s.to_dot.shift > 0 && !s.to_dot.wraps && s.to_dot.lowest <= 0 &&
                             s.to_dot.highest >= std::int64_t{1} << s.dot_fraction;
     return s.model == ShadingModel::blinn_phong && s.power == PowerRule::squaring && s.lights == 1 &&
-           s.white && !s.two_sided && !s.half_per_ray && !s.premultiplied && is_clamped &&
+           s.white && !s.two_sided && !s.fades && !s.half_per_ray && !s.premultiplied && is_clamped &&
            lanes::does_nothing(s.to_power_input) &&
            std::ranges::all_of(std::array{s.to_power, s.to_diffuse_sum, s.to_specular_sum, s.to_diffuse,
                                           s.to_specular, s.to_lit},
@@ -144,7 +156,7 @@ bool is_plain(const ShadingStage& s) {
 /// Says so to the compiler.
 HWY_INLINE void take_as_plain(ShadingStage& s) {
     s.model = ShadingModel::blinn_phong, s.power = PowerRule::squaring, s.lights = 1;
-    s.white = true, s.two_sided = s.half_per_ray = s.premultiplied = false;
+    s.white = true, s.two_sided = s.fades = s.half_per_ray = s.premultiplied = false;
     lanes::take_as_doing_nothing(s.to_power_input);
     for (Rescale* to : {&s.to_dot, &s.to_power, &s.to_diffuse_sum, &s.to_specular_sum, &s.to_diffuse,
                         &s.to_specular, &s.to_lit})
@@ -156,7 +168,7 @@ template <class L, bool kPlain>
 void shade_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
     std::conditional_t<kPlain, ShadingStage, const ShadingStage&> shading = plan.shading;
     if constexpr (kPlain) take_as_plain(shading);
-    const bool per_ray = shading.half_per_ray || shading.model == ShadingModel::phong;
+    const bool per_ray = shading.needs_ray();
     for (int at = 0; at < count; at += static_cast<int>(L::count())) {
         RayWords<L> ray;
         if (per_ray) {
@@ -165,7 +177,8 @@ void shade_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
                 ray.half[l] = load_three<L>(lit.half[l], at);
         }
         std::array<L, 3> color = load_three<L>(lit.color, at);
-        shade(shading, ray, load_three<L>(lit.normal, at), load<L>(lit.alpha.v + at), color);
+        const L certain = shading.fades ? load<L>(lit.confidence.v + at) : constant<L>(0);
+        shade(shading, ray, load_three<L>(lit.normal, at), load<L>(lit.alpha.v + at), color, certain);
         for (std::size_t c = 0; c < 3; ++c) store(color[c], lit.color[c].v + at);
     }
 }
@@ -176,11 +189,15 @@ void shading_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::S
     if (ways.gradient.is_float) {
         using L = Lanes<float, KnownRescales::nothing>;
         kernels.find_normals = &find_normals<L, L, false>;
+        kernels.find_gradients = &find_gradients<L, false>;
         kernels.shade = &shade_samples<L, false>;
         return;
     }
     constexpr KnownRescales kEven = KnownRescales::halves_to_even;
     lanes::with_integer_word<Lanes, kEven>(ways.gradient, [&]<class G>() {
+        kernels.find_gradients = &find_gradients<G, false>;
+        if constexpr (std::is_same_v<G, Lanes<std::int32_t, kEven>>)
+            if (is_plain(plan.gradient, *plan.volume)) kernels.find_gradients = &find_gradients<G, true>;
         lanes::with_integer_word<Lanes, kEven>(ways.shading, [&]<class L>() {
             kernels.find_normals = &find_normals<G, L, false>;
             if constexpr (std::is_same_v<G, Lanes<std::int32_t, kEven>> && std::is_same_v<L, G>)

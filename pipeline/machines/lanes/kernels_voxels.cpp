@@ -155,8 +155,8 @@ int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, int steps
                        lanes::LitSamples& lit) {
     const hn::ScalableTag<Word> d;
     const auto zero = hn::Zero(d);
-    const bool per_ray = plan.shading.half_per_ray || plan.shading.model == ShadingModel::phong;
-    const bool from_samples = plan.gradient_from_samples();
+    const bool per_ray = plan.shading.needs_ray(), locations = plan.keeps_locations();
+    const bool adaptive = plan.inside.rule == InsideRule::adaptive;
     int count = 0;
     for (int at = 0; at < steps * kRays; at += kLanes) {
         const int r = at % kRays;
@@ -169,9 +169,9 @@ int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, int steps
             hn::StoreU(hn::Compress(hn::Load(d, from), wanted), d, to.v + count);
         };
         hn::StoreU(hn::Compress(hn::Iota(d, at), wanted), d, lit.from.v + count);
-        for (int end = 0; end < (plan.needs_back ? 2 : 1); ++end)
+        for (int end = 0; end < (plan.inside.needs_back() ? 2 : 1); ++end)
             for (int a = 0; a < 3; ++a) {
-                if (from_samples) {
+                if (locations) {
                     pack(s.location[a].v + at + end * kRays, lit.location[end][a]);
                     continue;
                 }
@@ -180,6 +180,10 @@ int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, int steps
             }
         for (int c = 0; c < 3; ++c) pack(s.color[c].v + at, lit.color[c]);
         pack(s.alpha.v + at, lit.alpha);
+        if (adaptive) {
+            for (int end = 0; end < 2; ++end) pack(s.input.v + at + end * kRays, lit.input[end]);
+            pack(s.length.v + at, lit.length);
+        }
         for (int a = 0; per_ray && a < 3; ++a) {
             pack(rays.view[a].v + r, lit.view[a]);
             for (int l = 0; l < plan.shading.lights; ++l) pack(rays.half[l][a].v + r, lit.half[l][a]);
@@ -258,7 +262,7 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
     const auto clamped = [](std::int64_t i, std::int64_t end) {
         return std::clamp<std::int64_t>(i, 0, end - 1);
     };
-    for (int end = 0; end < (plan.needs_back ? 2 : 1); ++end)
+    for (int end = 0; end < plan.gradients_a_slab(); ++end)
         for (int at = 0; at < count; at += kLanes) {
             lanes::Batch* pair = lit.pair[end];
             const auto& cell = lit.cell[end];

@@ -57,7 +57,7 @@ double drift_of(const Plan& plan) {
 
 // Blocks that a slab's two ends may lie apart; 0 where one sample classifies it.
 int slab_reach(const Plan& plan) {
-    if (!plan.needs_back) return 0;
+    if (!plan.samples_both_ends()) return 0;
     return static_cast<int>(std::ceil(std::min((plan.scene.sampling.step + drift_of(plan)) / kBlock, 1e6)));
 }
 
@@ -169,6 +169,8 @@ StageWays ways_of(const Plan& plan) {
 
 std::optional<std::string> what_needs_the_model(const Plan& plan) {
     if (plan.real && !plan.float32) return "nothing is rounded";
+    // The kernels for it are there (kernels_inside.cpp), and not yet held against the model.
+    if (plan.inside.rule == InsideRule::adaptive) return "slabs in pieces are lit by the model";
     if (plan.float32) {  // formats do not matter
         if (plan.projection_mode) return "mip, minip and average of floats run in the model";
         if (plan.scene.output.depth || plan.scene.output.normals)
@@ -193,12 +195,16 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
     if (const auto obstacle = too_wide("classification input", plan.input_needs)) return obstacle;
     if (plan.lit && plan.specs[Wire::normal].overflow == Overflow::wrap)
         return "a normal that wraps round is divided by the model";
+    if (plan.gradient.fades && plan.specs[Wire::confidence].overflow == Overflow::wrap)
+        return "a confidence that wraps round is divided by the model";
     std::vector<Wire> stored{
         Wire::location,     Wire::direction,  Wire::weight,     Wire::length,    Wire::classification_input,
         Wire::slab_ratio,   Wire::slab_color, Wire::slab_alpha, Wire::lit_color, Wire::color,
         Wire::transparency, Wire::light};
     if (plan.lit) stored.push_back(Wire::normal);
+    if (plan.gradient.fades) stored.push_back(Wire::confidence);
     if (plan.gradient_from_samples()) stored.push_back(Wire::sample);
+    if (plan.inside.rule == InsideRule::adaptive) stored.push_back(Wire::gradient);
     for (const Wire wire : stored) {
         const Format& f = plan.specs[wire].format;
         if (f.integer_bits + f.fraction_bits > 31)
@@ -291,6 +297,10 @@ void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& 
     const auto workspace = std::make_unique_for_overwrite<Workspace>();
     Workspace& w = *workspace;
     if (plan_.lit) w.lit = {};  // lanes behind the last gathered sample are computed, too
+    if (plan_.inside.rule == InsideRule::adaptive) {
+        w.ends = w.picked = w.pieces = {}, w.cut = {};
+        for (Batch& component : w.end_gradient) component = {};
+    }
     PacketLoop loop(plan_, kernels_, voxels_, empty_.get(), w);
     const bool colors_alone = !plan_.projection_mode && image.channels.size() == 4;
     for (int y = top; y < bottom; y += kSide)

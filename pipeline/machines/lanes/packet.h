@@ -67,7 +67,7 @@ struct Rows {
 struct alignas(64) Samples {
     Word first = 0;
     Batch cell[3], weight[3];
-    Batch location[3];  // where gradients are made of samples
+    Batch location[3];  // where gradients are made of samples, or lie between them
     Batch place;  // of the cell in memory (VoxelSource): among the cells, or below 0; or of its lowest voxel
     Batch pair[4];          // corners by pairs along x: the lower in the low half; y fastest
     Batch input;            // classification input
@@ -82,12 +82,15 @@ struct alignas(64) LitSamples {
     // The 4x4x4 voxels about its cell, by pairs along x; for central differences alone, of outer rows the
     // inner pair, in place of the first.
     Batch pair[2][32];
-    Batch location[2][3];   // in place of cell and weight, of a gradient from samples
+    Batch location[2][3];   // in place of cell and weight, of a gradient from samples or between ends
     Batch beside[2][3][2];  // scalars one voxel off along each axis: behind, ahead
     Batch half[kMostHalves][3], view[3];
     Batch gradient[3];  // raw; the sum of a slab's two ends
     Batch normal[3];
+    Batch confidence;  // where light fades in
     Batch color[3], alpha;
+    // Where slabs may be cut: inputs at both ends, length, and log2 of the pieces.
+    Batch input[2], length, cuts;
 };
 
 /// Whether a row of four voxels, of the 4x4 about a cell, holds none of the cell's corners.
@@ -98,14 +101,16 @@ constexpr bool is_outer_row(int y, int z) {
 /// Sixteen pixels on their way.
 struct alignas(64) PixelPacket {
     Row color[3], transparency;
-    Row active;   // 1 while a ray goes on
-    Row samples;  // slabs composited
+    Row remainder;  // w_carry
+    Row active;     // 1 while a ray goes on
+    Row samples;    // slabs composited
 };
 
 /// What stands for sixteen rays in MIP, MinIP and average, so far.
 struct alignas(64) ProjectionPacket {
-    Row extreme;              // the largest or smallest input
-    std::int64_t sum[kRays];  // of inputs
+    Row extreme;                    // the largest or smallest input
+    std::int64_t sum[kRays];        // of both ends' inputs of every full slab
+    std::int64_t last_ends[kRays];  // of the last slab's
 };
 
 }  // namespace squint::lanes

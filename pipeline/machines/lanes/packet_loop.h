@@ -52,6 +52,11 @@ struct Workspace {
     ProjectionPacket projection;
     Samples samples[2];  // this batch, and the next one's locations
     LitSamples lit;
+    // Slabs that are lit in pieces: their ends and the gradients there, those of one number of pieces, and
+    // their pieces.
+    LitSamples ends, picked, pieces;
+    Batch end_gradient[3];
+    Samples cut;
     Samples beside;  // those that a gradient is made of
     Notes notes;
 };
@@ -95,11 +100,10 @@ class PacketLoop {
     /// Ray r's pixel.
     Pixel<std::int64_t> pixel(int r) const {
         if (plan_.projection_mode && w_.rays.slabs.v[r] > 0)
-            return project_pixel(plan_,
-                                 plan_.scene.compositing.mode == CompositingMode::average
-                                     ? w_.projection.sum[r]
-                                     : w_.projection.extreme.v[r],
-                                 w_.rays.slabs.v[r]);
+            return project_pixel(
+                plan_, {plan_.scene.compositing.mode == CompositingMode::average ? w_.projection.sum[r]
+                                                                                 : w_.projection.extreme.v[r],
+                        w_.projection.last_ends[r], w_.rays.slabs.v[r], w_.rays.last_length.v[r]});
         return finished<std::int64_t>(w_.pixels, r, notes_ ? w_.notes.pixel[r] : Pixel<std::int64_t>{});
     }
 
@@ -121,7 +125,7 @@ class PacketLoop {
             // Inputs are not negative.
             w_.projection.extreme.v[r] =
                 plan_.scene.compositing.mode == CompositingMode::minip ? std::numeric_limits<Word>::max() : 0;
-            w_.projection.sum[r] = 0;
+            w_.projection.sum[r] = w_.projection.last_ends[r] = 0;
         }
     }
     template <class W>
@@ -129,6 +133,7 @@ class PacketLoop {
         for (int r = 0; r < kRays; ++r) {
             for (std::size_t c = 0; c < 3; ++c) w_.pixels.color[c].v[r] = bits_of(none.color[c]);
             w_.pixels.transparency.v[r] = bits_of(none.transparency);
+            w_.pixels.remainder.v[r] = bits_of(none.remainder);
             w_.pixels.active.v[r] = w_.rays.slabs.v[r] > 0;
             w_.pixels.samples.v[r] = 0;
         }
@@ -143,7 +148,7 @@ class PacketLoop {
             batch(rows, next, carried);
             if (!any_active(w_.pixels)) return;
             kernels_.pass_over(w_.rays, rows.end(), next.first, w_.pixels);
-            carried = plan_.needs_back && next.first == rows.end();
+            carried = plan_.samples_both_ends() && next.first == rows.end();
             rows = next;
         }
     }
@@ -165,7 +170,7 @@ class PacketLoop {
 
     // A batch's slabs through all stages.  `next`: the batch behind it, no rows where that is not known.
     void batch(const Rows& rows, const Rows& next, bool carried) {
-        const int back = plan_.needs_back ? 1 : 0;
+        const int back = plan_.samples_both_ends() ? 1 : 0;
         const int from = carried ? 1 : 0, to = rows.count + back;
         if (located_ == rows.first) {
             current_ = 1 - current_;
@@ -201,7 +206,7 @@ class PacketLoop {
     void look_ahead(const Rows& next, int from) {
         located_ = -1;
         if (next.count == 0) return;
-        locate(w_.samples[1 - current_], next.first, from, next.count + (plan_.needs_back ? 1 : 0));
+        locate(w_.samples[1 - current_], next.first, from, next.count + (plan_.samples_both_ends() ? 1 : 0));
         located_ = next.first;
     }
 
@@ -212,7 +217,7 @@ class PacketLoop {
         };
         move(from.input, to.input), move(from.length, to.length);
         for (int a = 0; a < 3; ++a) move(from.cell[a], to.cell[a]), move(from.weight[a], to.weight[a]);
-        for (int a = 0; plan_.gradient_from_samples() && a < 3; ++a) move(from.location[a], to.location[a]);
+        for (int a = 0; plan_.keeps_locations() && a < 3; ++a) move(from.location[a], to.location[a]);
     }
 
     // Gathers what is visible and not yet hidden, lights it, and puts it back.  Gives its number.
@@ -222,28 +227,82 @@ class PacketLoop {
         if (!backwards_) kernels_.hide(plan_, w_.rays, w_.pixels, steps, s);
         const int count = kernels_.gather_lit(plan_, w_.rays, steps, s, lit);
         if (count == 0) return 0;
-        if (plan_.gradient_from_samples())
-            sample_beside(count);
-        else
-            kernels_.fetch_lit(plan_, count, lit);
-        kernels_.find_normals(plan_, count, lit);
-        kernels_.shade(plan_, count, lit);
-        for (int i = 0; i < count; ++i)
-            for (int c = 0; c < 3; ++c) s.color[c].v[lit.from.v[i]] = lit.color[c].v[i];
+        if (plan_.inside.rule == InsideRule::adaptive) {
+            light_as_it_turns(steps, count);
+            return count;
+        }
+        if (plan_.inside.rule == InsideRule::middle)
+            kernels_.place_between(plan_, lit, 0, count, 1, 1, lit, 0);
+        shade(count, lit);
+        put_back(count, lit);
         return count;
     }
 
-    // The six samples about each of the first `count` gathered ones, or about either of its ends.
-    void sample_beside(int count) {
+    // Stages 3 and 5 of gathered places.
+    void shade(int count, LitSamples& lit) {
+        look_around(count, lit);
+        kernels_.find_normals(plan_, count, lit);
+        kernels_.shade(plan_, count, lit);
+    }
+    void put_back(int count, const LitSamples& lit) {
+        Samples& s = here();
+        for (int i = 0; i < count; ++i)
+            for (int c = 0; c < 3; ++c) s.color[c].v[lit.from.v[i]] = lit.color[c].v[i];
+    }
+
+    // In 1, 2 or 4 pieces by the angle between the gradients at a slab's ends, which are computed once for
+    // both slabs beside them.
+    void light_as_it_turns(int steps, int count) {
+        const int ends = kernels_.gather_ends(plan_, w_.rays, steps, here(), w_.ends);
+        if (ends > 0) {
+            look_around(ends, w_.ends);
+            kernels_.find_gradients(plan_, ends, w_.ends);
+        }
+        for (int i = 0; i < ends; ++i)
+            for (int a = 0; a < 3; ++a) w_.end_gradient[a].v[w_.ends.from.v[i]] = w_.ends.gradient[a].v[i];
+        kernels_.find_cuts(plan_, count, w_.end_gradient, w_.lit);
+        for (int bits = 0; bits <= kMostCuts; ++bits) {
+            const int many = kernels_.pick_by_cuts(plan_, count, bits, w_.lit, w_.picked);
+            if (many == 0) continue;
+            if (bits == 0) {
+                kernels_.place_between(plan_, w_.picked, 0, many, 1, 1, w_.picked, 0);
+                shade(many, w_.picked);
+            }
+            for (int at = 0; bits > 0 && at < many; at += kRays) light_sixteen(at, bits);
+            put_back(many, w_.picked);
+        }
+    }
+    void light_sixteen(int at, int bits) {
+        kernels_.cut(plan_, w_.picked, at, bits, w_.cut);
+        kernels_.classify(plan_, 1 << bits, w_.cut);
+        const int count = kRays << bits;
+        std::copy_n(w_.cut.alpha.v, count, w_.pieces.alpha.v);
+        for (int c = 0; c < 3; ++c) std::copy_n(w_.cut.color[c].v, count, w_.pieces.color[c].v);
+        for (int to = 0, part = 1; to < count; to += kRays, part += 2) {
+            kernels_.place_between(plan_, w_.picked, at, kRays, part, bits + 1, w_.pieces, to);
+            for (int a = 0; plan_.shading.needs_ray() && a < 3; ++a) {
+                std::copy_n(w_.picked.view[a].v + at, kRays, w_.pieces.view[a].v + to);
+                for (int l = 0; l < plan_.shading.lights; ++l)
+                    std::copy_n(w_.picked.half[l][a].v + at, kRays, w_.pieces.half[l][a].v + to);
+            }
+        }
+        shade(count, w_.pieces);
+        kernels_.join(plan_, w_.pieces, bits, w_.picked, at);
+    }
+
+    // What the gradients of the first `count` gathered places are made of: voxels, or the six samples about
+    // each place.
+    void look_around(int count, LitSamples& lit) {
+        if (!plan_.gradient_from_samples()) return kernels_.fetch_lit(plan_, count, lit);
         const int rows = (count + kRays - 1) / kRays;
-        for (int end = 0; end < (plan_.needs_back ? 2 : 1); ++end)
+        for (int end = 0; end < plan_.gradients_a_slab(); ++end)
             for (int axis = 0; axis < 3; ++axis)
                 for (const bool ahead : {false, true}) {
-                    kernels_.step_aside(plan_, w_.lit, end, axis, ahead, rows, w_.beside);
+                    kernels_.step_aside(plan_, lit, end, axis, ahead, rows, w_.beside);
                     kernels_.prefetch(voxels_, 0, rows, w_.beside);
                     kernels_.fetch(voxels_, 0, rows, w_.beside);
                     kernels_.interpolate_scalars(plan_, 0, rows, w_.beside);
-                    std::copy_n(w_.beside.input.v, rows * kRays, w_.lit.beside[end][axis][ahead].v);
+                    std::copy_n(w_.beside.input.v, rows * kRays, lit.beside[end][axis][ahead].v);
                 }
     }
 

@@ -376,8 +376,16 @@ constexpr std::array<bool, kWires> kPlaces = [] {
 }();
 
 /// `same_places`: the double's samples stand where the words' do.
-/// Every method's words of `wide` against its own double on a scene, unlit; what a method refuses is left
-/// out. SQUINT_HARD_SIZE: another number of pixels a side.
+/// What the plan says that tables of words leave out and doubles do not: PI2D's cells both have.
+double left_out_by_words(const Plan& plan) {
+    double sum = 0;
+    for (const Approximation& a : plan.approximations)
+        if (a.of != "cells between their nodes") sum += a.lsb8;
+    return sum;
+}
+
+/// Every method's words of `wide` against its own double on a scene, unlit: half an LSB8 beside what the plan
+/// says their tables leave out; what a method refuses is left out. SQUINT_HARD_SIZE: another number of pixels a side.
 void expect_half_an_lsb8(const std::string& name, Scene scene, int size, bool same_places = false) {
     if (const char* asked = std::getenv("SQUINT_HARD_SIZE")) size = std::atoi(asked);
     const std::string pixels = std::to_string(size);
@@ -388,11 +396,13 @@ void expect_half_an_lsb8(const std::string& name, Scene scene, int size, bool sa
     for (const NamedMethod& method : every_method()) {
         scene.classification.method = method.method, scene.classification.order = method.order;
         Image pictures[2];
+        double left_out = 0;
         try {
             for (const int real : {0, 1}) {
                 scene.precision.preset = real ? "real" : "wide";
                 Plan plan = make_plan(scene, volume);
                 if (real && same_places) set_active(plan, kPlaces);
+                if (!real) left_out = left_out_by_words(plan);
                 pictures[real] = render(plan).image;
             }
         } catch (const InputError&) {
@@ -400,7 +410,7 @@ void expect_half_an_lsb8(const std::string& name, Scene scene, int size, bool sa
             continue;
         }
         const double worst = largest_difference_lsb8(pictures[0], pictures[1]);
-        EXPECT_LE(worst, 0.5) << name << ' ' << method.name;
+        EXPECT_LE(worst, 0.5 + left_out) << name << ' ' << method.name;
         most = std::max(most, worst);
     }
     testing::Test::RecordProperty(name, std::to_string(most));

@@ -122,7 +122,10 @@ void draw_light(Draw& draw, Scene& scene) {
         scene.lights.push_back(light);
     }
     ShadingSettings& shading = scene.shading;
-    shading.model = draw.once_in(2) ? ShadingModel::phong : ShadingModel::blinn_phong;
+    shading.model = draw.one_of({ShadingModel::phong, ShadingModel::blinn_phong, ShadingModel::blinn_phong,
+                                 ShadingModel::cone, ShadingModel::gooch});
+    shading.cone_slope = draw.any_of<ConeSlope>(), shading.cool_side = draw.any_of<CoolSide>();
+    shading.cool = draw.vector(0, 1), shading.warm = draw.vector(0, 1);
     shading.gradient = draw.one_of({GradientRule::central, GradientRule::sobel, GradientRule::analytic,
                                     GradientRule::central, GradientRule::central_samples});
     shading.ka = draw.real(0, 1), shading.kd = draw.real(0, 1), shading.ks = draw.real(0, 1);
@@ -131,6 +134,7 @@ void draw_light(Draw& draw, Scene& scene) {
                            ? std::ldexp(1.0, static_cast<int>(draw.between(0, 7)))
                            : draw.real(1, 200);
     shading.two_sided = draw.once_in(3);
+    if (draw.once_in(4)) shading.gradient_floor = draw.one_of({draw.real(0, 4), draw.real(0, 400), 1.0});
 }
 
 /// Any format, rounding and overflow rule for a wire, not far from the one it has: the plan refuses some.
@@ -201,6 +205,11 @@ Case draw_case(unsigned seed, const std::string& preset) {
     scene.classification = {};
     ClassificationSettings& method = scene.classification;
     method.method = draw.one_of({Method::pc, Method::pc_mid, draw.any_of<Method>(), draw.any_of<Method>()});
+    if (draw.once_in(2)) scene.shading.inside = draw.any_of<InsideRule>();
+    if (scene.shading.inside == InsideRule::adaptive && method.method != Method::leg)
+        method.method = Method::pips;
+    if (scene.sampling.interpolation == InterpolationRule::nearest && method.method != Method::pc_mid)
+        method.method = Method::pc;  // slab methods are refused there
     method.order = static_cast<int>(method.method == Method::leg ? draw.between(2, 4) : draw.between(1, 5));
     method.table_size = 64;
     method.lookup = draw.any_of<TableLookup>();
@@ -236,6 +245,9 @@ std::vector<Share> shares() {
         {"depth", [](const Plan& p) { return p.scene.output.depth && !p.projection_mode; }},
         {"normals", [](const Plan& p) { return p.scene.output.normals && p.lit; }},
         {"gradients from samples", [](const Plan& p) { return p.gradient_from_samples(); }},
+        {"light at the middle", [](const Plan& p) { return p.inside.rule == InsideRule::middle; }},
+        {"light that fades in", [](const Plan& p) { return p.gradient.fades; }},
+        {"gooch", [](const Plan& p) { return p.lit && p.shading.model == ShadingModel::gooch; }},
         {"one voxel thick along x", [](const Plan& p) { return p.volume->dims.x == 1; }},
     };
 }

@@ -19,7 +19,8 @@ using Word = std::int64_t;
 using Pixel = Accumulated<Word>;
 using enum CompositingForm;
 
-constexpr CompositingForm kForms[] = {w, equation_9, alpha, back_to_front, unit255_shift, unit255_blinn};
+constexpr CompositingForm kForms[] = {
+    w, w_carry, equation_9, alpha, back_to_front, unit255_shift, unit255_blinn};
 
 /// Every wire u1.F, as plan.cpp builds it.
 CompositingStage stage_of(CompositingForm form, int bits, Rounding rounding, bool premultiplied = false) {
@@ -28,8 +29,13 @@ CompositingStage stage_of(CompositingForm form, int bits, Rounding rounding, boo
     s.form = form, s.premultiplied = premultiplied;
     s.alpha_fraction = s.color_fraction = s.contribution_fraction = s.transparency_fraction = bits;
     s.to_contribution = s.to_transparency = s.to_color = s.to_slab_color = Rescale(2 * bits, spec);
-    if (form == w) s.to_transparency = Rescale(bits, spec);
+    if (s.takes_from_transparency()) s.to_transparency = Rescale(bits, spec);
     s.to_color_sum = s.to_transparency_sum = s.color_to_code = Rescale(bits, spec);
+    if (form == w_carry) {
+        s.to_contribution = Rescale(2 * bits, {spec.format, Rounding::trn, Overflow::sat});
+        const Spec whole{{1, 2 * bits, false}};  // C is exact
+        s.sum_fraction = 2 * bits, s.to_color = s.to_color_sum = Rescale(2 * bits, whole);
+    }
     if (s.is_unit255()) {
         const Spec code{{bits, 0, false}, Rounding::rnd, Overflow::sat};
         s.alpha_to_code = s.color_to_code = Rescale(bits, code);
@@ -116,6 +122,57 @@ TEST(Compositing, OpacityOneOf128LeavesSevenBitsOpaqueTruncatingAndHalfWayRoundi
     EXPECT_EQ(transparency_behind(stage_of(equation_9, 7, Rounding::trn), 127, 1), 1);
     EXPECT_EQ(transparency_behind(stage_of(equation_9, 7, Rounding::trn), 128, 1), 0);
     EXPECT_EQ(transparency_behind(stage_of(equation_9, 7, Rounding::rnd), 5000, 1), 64);
+}
+
+// What is rounded at a slab is what the slab before it has left over: sums of it telescope (docs/compositing.md).
+TEST(Compositing, CarriedRemaindersKeepFogOfAnyLengthWithinOneLastBit) {
+    std::mt19937_64 random(11);
+    for (const int bits : {4, 8, 12, 15}) {
+        const CompositingStage s = stage_of(w_carry, bits, Rounding::trn);
+        const auto one = static_cast<double>(s.unit());
+        for (const int samples : {1, 64, 1024, 30'000, 1'000'000})
+            for (const bool drawn : {false, true}) {
+                Pixel pixel = nothing_yet<Word>(s);
+                long double exact = one;
+                for (int k = 0; k < samples; ++k) {
+                    const Word a = drawn ? static_cast<Word>(random() % 3) : 1;
+                    add(s, pixel, 0, a);
+                    exact *= 1 - static_cast<long double>(a) / one;
+                    ASSERT_TRUE(pixel.remainder >= 0 && pixel.remainder < Word{1} << bits);
+                }
+                // Each step's error is shrunk by what lies behind it, so the telescoped sum stays below one; half
+                // a bit of it is where the remainder starts.
+                EXPECT_LE(std::abs(static_cast<double>(pixel.transparency) - static_cast<double>(exact)), 1)
+                    << bits << " bits, " << samples << " samples";
+            }
+    }
+}
+
+TEST(Compositing, CarriedRemaindersKeepColoursWithinTheirVariationAlongTheRay) {
+    std::mt19937_64 random(12);
+    constexpr int kBits = 12;
+    const CompositingStage s = stage_of(w_carry, kBits, Rounding::trn);
+    const double one = 1 << kBits;
+    for (int ray = 0; ray < 300; ++ray) {
+        const int samples = 1 + static_cast<int>(random() % 400);
+        std::vector<Word> opacity, color;
+        for (int k = 0; k < samples; ++k) {
+            opacity.push_back(static_cast<Word>(random() % 4097 >> random() % 12));
+            color.push_back(ray % 2 ? static_cast<Word>(random() % 4097) : 4096 * k / samples);
+        }
+        Pixel pixel = nothing_yet<Word>(s);
+        for (std::size_t k = 0; k < opacity.size(); ++k) add(s, pixel, color[k], opacity[k]);
+        // G: what lies behind, as seen at T = 1; the error is sum of (r_k - r_(k+1)) (c_k - G_(k+1)), in last bits.
+        double behind = 0, variation = 0, last = 0;
+        for (std::size_t k = opacity.size(); k-- > 0;) {
+            const double c = static_cast<double>(color[k]) / one, a = static_cast<double>(opacity[k]) / one;
+            const double weight = c - behind;
+            if (k + 1 < opacity.size()) variation += std::abs(weight - last);
+            last = weight, behind = c * a + (1 - a) * behind;
+        }
+        const double error = static_cast<double>(pixel.color[0]) / one - behind * one;  // in last bits of w
+        EXPECT_LE(std::abs(error), 1 + variation) << samples << " samples";
+    }
 }
 
 // C6.3
@@ -333,7 +390,7 @@ TEST(Compositing, TransparentSamplesChangeNoBitWherever) {
 TEST(Compositing, IntervalsHoldEveryPixel) {
     std::mt19937_64 random(7);
     for (int i = 0; i < 20'000; ++i) {
-        const CompositingForm form = kForms[random() % 6];
+        const CompositingForm form = kForms[random() % std::size(kForms)];
         const int bits = 4 + static_cast<int>(random() % 12);
         const CompositingStage s = stage_of(form, bits, static_cast<Rounding>(random() % 4), random() % 2);
         const Word one = Word{1} << bits;

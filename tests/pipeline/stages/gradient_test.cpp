@@ -305,6 +305,63 @@ TEST(Gradient, SamplesToEitherSideAreHalved) {
     EXPECT_EQ(sample_difference<Word>(s, 0, 4095 << 12), -(Word{4095} << 11));
 }
 
+/// Confidence in u1.15 up to a floor of raw units.
+GradientStage fading_stage(double floor) {
+    GradientStage s = stage_of(GradientRule::central, 8, 15);
+    s.confidence_fraction = 15;
+    s.to_confidence = Rescale(0, Spec{{1, 15, false}, Rounding::rnd_conv, Overflow::sat});
+    fade_in_up_to(s, floor);
+    return s;
+}
+
+TEST(Confidence, IsOneFromTheFloorOnAndNearTheRatioBelow) {
+    std::mt19937_64 random(9);
+    for (const double floor : {1.0, 2.5, 100.0, 16384.0, 32767.0, 40000.0, 1e6, 1.6e7}) {
+        const GradientStage s = fading_stage(floor);
+        for (int i = 0; i < 20'000; ++i) {
+            const double size = floor * static_cast<double>(random() % 4000) / 2000;
+            const auto component = [&] {
+                return static_cast<Word>(size * (static_cast<double>(random() >> 11) * 0x1p-52 - 1));
+            };
+            const Vector g{component(), component(), component()};
+            const double length = length_of(g, 1), part = std::min(1.0, length / std::floor(floor));
+            const Word k = confidence(s, g);
+            ASSERT_LE(k, 1 << 15);
+            ASSERT_NEAR(static_cast<double>(k) * 0x1p-15, part, 0x1p-13 + 0x1p-16) << floor;
+            if (length >= floor) {
+                ASSERT_EQ(k, 1 << 15) << g[0] << ' ' << g[1] << ' ' << g[2];
+            }
+        }
+        EXPECT_EQ(confidence(s, Vector{0, 0, 0}), 0);
+    }
+}
+
+TEST(Confidence, NeverFallsAsAGradientGrows) {
+    for (const double floor : {3.0, 900.0, 70000.0}) {
+        const GradientStage s = fading_stage(floor);
+        Word before = 0;
+        for (Word x = 0; x <= static_cast<Word>(2 * floor); x += 1 + static_cast<Word>(floor) / 2000) {
+            const Word k = confidence(s, Vector{x, -x / 3, x / 2});
+            ASSERT_GE(k, before) << x;
+            before = k;
+        }
+        EXPECT_EQ(before, 1 << 15);
+    }
+}
+
+// 2^-40 of 8 bits' range, in levels: a rounding in doubles leaves 1e-13.
+TEST(Normalise, InDoublesARoundingOfZeroIsZero) {
+    GradientStage s = stage_of(GradientRule::central, 8, 15);
+    s.to_normal.active = false;
+    s.vanishing = kVanishing * 255 * 256;
+    const auto normal_of = [&](double x) {
+        return normalise(s, std::array<Real<double>, 3>{{{x * 256}, {0}, {-0.0}}});
+    };
+    for (const double x : {0.0, 1.1e-13, -2.3e-10}) EXPECT_EQ(normal_of(x)[0].v, 0) << x;
+    EXPECT_EQ(normal_of(2.4e-10)[0].v, -32768);
+    EXPECT_EQ(normal_of(-1e-3)[0].v, 32768);
+}
+
 TEST(Gradient, IntervalsHoldEveryFieldsGradientAndNormal) {
     std::mt19937_64 random(8);
     for (const GradientRule rule : kVoxelRules)

@@ -73,6 +73,8 @@ ShadingStage stage_of(double ka, double kd, double ks, ShadingModel model = Shad
     s.to_diffuse_sum = Rescale(15 + kMaterial, intensity);
     s.to_diffuse = s.to_specular = Rescale(kMaterial + 15, intensity);
     s.to_lit = Rescale(30, unsigned_spec(15));
+    s.to_faded = Rescale(30, intensity);
+    s.gooch.to_faded = Rescale(30, signed_spec(15)), s.gooch.to_side = Rescale(16, intensity);
     return s;
 }
 
@@ -117,7 +119,7 @@ TEST(Shading, ADotProductBeyondOneIsOne) {
 
 // C5.3
 TEST(Shading, ASurfaceAlongOrAwayFromTheLightHasAmbientOnly) {
-    for (const ShadingModel model : {ShadingModel::phong, ShadingModel::blinn_phong}) {
+    for (const ShadingModel model : {ShadingModel::phong, ShadingModel::blinn_phong, ShadingModel::cone}) {
         const ShadingStage s = lit_from_above(0.25, 0.5, 0.25, model);
         const Word ambient = 20000 / 4;
         EXPECT_EQ(lit(s, {kOne, 0, 0}, 20000), ambient);
@@ -197,6 +199,58 @@ TEST(Shading, TheParabolaKeepsTheFractionOfItsExponent) {
                   one - quantise(67 * below, Rescale(2, {{20, 0, false}, Rounding::rnd_conv})));
 }
 
+TEST(Shading, AConeIsItsFormulaWhateverThePowerRule) {
+    for (const PowerRule rule : {PowerRule::squaring, PowerRule::table}) {
+        ShadingStage s = lit_from_above(0, 0, 1, ShadingModel::cone);
+        set_power(s, rule, 31, 15);
+        s.parabola_slope = 32;  // half of it: 1 - 16 (1 - x), the energy of exponent 31
+        for (Word x = 0; x <= kOne; x += 7)
+            ASSERT_EQ(lit(s, {0, 0, x}, 0), std::max<Word>(0, kOne - 16 * (kOne - x)));
+        s.parabola_slope = 62;  // the paper's
+        EXPECT_EQ(lit(s, {0, 0, kOne - 100}, 0), kOne - 3100);
+    }
+}
+
+/// A quarter of the matter's colour and blue on the cool side, half of it and yellow on the warm one.
+ShadingStage gooch_stage() {
+    ShadingStage s = lit_from_above(0, 0, 0, ShadingModel::gooch);
+    s.gooch.share = {1 << (kMaterial - 2), 1 << (kMaterial - 1)};
+    s.gooch.tone = {{{0, 1 << (kMaterial - 2)}, {0, 1 << (kMaterial - 2)}, {1 << (kMaterial - 1), 0}}};
+    return s;
+}
+Vector gooch(const ShadingStage& s, const Vector& normal, Word confidence = kOne) {
+    Vector color{16000, 16000, 16000};
+    shade(s, RayWords<Word>{}, normal, kOne, color, confidence);
+    return color;
+}
+
+TEST(Shading, GoochGoesFromCoolToWarmAsASurfaceTurnsToTheLight) {
+    ShadingStage s = gooch_stage();
+    const Vector cool{4000, 4000, 4000 + kOne / 2}, warm{8000 + kOne / 4, 8000 + kOne / 4, 8000};
+    const Vector between{6000 + kOne / 8, 6000 + kOne / 8, 6000 + kOne / 4};  // not nothing: N.L is zero
+    EXPECT_EQ(gooch(s, {0, 0, kOne}), warm);
+    EXPECT_EQ(gooch(s, {0, 0, -kOne}), cool);
+    EXPECT_EQ(gooch(s, {kOne, 0, 0}), between);
+    EXPECT_EQ(gooch(s, {0, 0, 0}), between);
+    s.fades = true;
+    EXPECT_EQ(gooch(s, {0, 0, kOne}, 0), between);
+    EXPECT_EQ(gooch(s, {0, 0, kOne}, kOne), warm);
+    s.gooch.cool_to_light = true;  // as printed
+    EXPECT_EQ(gooch(s, {0, 0, kOne}), cool);
+    EXPECT_EQ(gooch(s, {0, 0, -kOne}), warm);
+}
+
+TEST(Shading, GoochIsHeldToTheOpacity) {
+    ShadingStage s = gooch_stage();
+    s.gooch.share = {1 << kMaterial, 1 << kMaterial};
+    for (auto& tone : s.gooch.tone) tone = {1 << kMaterial, 1 << kMaterial};
+    EXPECT_EQ(gooch(s, {0, 0, kOne}), (Vector{kOne, kOne, kOne}));
+    s.premultiplied = true;
+    Vector color{2000, 2000, 2000};
+    shade(s, RayWords<Word>{}, Vector{0, 0, kOne}, Word{3000}, color, kOne);
+    EXPECT_EQ(color, (Vector{3000, 3000, 3000}));
+}
+
 // C5.5
 TEST(Shading, WeightsThatSumToOneLightWhiteToOneAndLightsSaturate) {
     EXPECT_EQ(lit(lit_from_above(0.25, 0.5, 0.25), {0, 0, kOne}, kOne), kOne);
@@ -212,7 +266,7 @@ TEST(Shading, WeightsThatSumToOneLightWhiteToOneAndLightsSaturate) {
 // C5.6
 TEST(Shading, AZeroNormalHasAmbientOnly) {
     for (const bool two_sided : {false, true})
-        for (const ShadingModel model : {ShadingModel::phong, ShadingModel::blinn_phong})
+        for (const ShadingModel model : {ShadingModel::phong, ShadingModel::blinn_phong, ShadingModel::cone})
             for (const PowerRule rule : {PowerRule::squaring, PowerRule::parabola, PowerRule::table}) {
                 ShadingStage s = lit_from_above(0.5, 0.25, 0.25, model);
                 set_power(s, rule, 8, 15);
@@ -239,6 +293,27 @@ TEST(Shading, ATransparentSlabHasNoHighlight) {
     s.premultiplied = true;
     EXPECT_EQ(lit(s, {0, 0, kOne}, 0, 0), 0);
     EXPECT_EQ(lit(s, {0, 0, kOne}, 100, 400), 175);  // 100 (ka + kd) + 400 ks
+}
+
+TEST(Shading, WhatALightAddsIsWeighedByConfidence) {
+    std::mt19937_64 random(5);
+    ShadingStage s = lit_from_above(0.25, 0.5, 0.25), fading = s;
+    fading.fades = true;
+    for (int i = 0; i < 2000; ++i) {
+        const auto component = [&] { return static_cast<Word>(random() % 65537) - kOne; };
+        const Vector n{component(), component(), component()};
+        const auto faded = [&](Word confidence) {
+            Vector color{25000, 25000, 25000};
+            shade(fading, RayWords<Word>{}, n, kOne, color, confidence);
+            return color[0];
+        };
+        const Word full = lit(s, n, 25000), ambient = 6250;
+        ASSERT_EQ(faded(kOne), full);
+        ASSERT_EQ(faded(0), ambient);
+        // Two of four roundings to a half, each of a weight below one, and the last one's own.
+        ASSERT_NEAR(static_cast<double>(faded(kOne / 4)), ambient + static_cast<double>(full - ambient) / 4,
+                    2.5);
+    }
 }
 
 TEST(Shading, BothSidesOfASurfaceAreLitAlikeWhereTheSceneSaysSo) {
@@ -283,8 +358,14 @@ TEST(Shading, ColouredLightsTintTheirOwnChannelOnly) {
 TEST(Shading, IntervalsHoldEveryLitColour) {
     std::mt19937_64 random(2);
     for (int i = 0; i < 800; ++i) {
-        ShadingStage s =
-            stage_of(0.3, 0.5, 0.4, random() % 2 ? ShadingModel::phong : ShadingModel::blinn_phong);
+        constexpr ShadingModel kModels[] = {ShadingModel::phong, ShadingModel::blinn_phong,
+                                            ShadingModel::cone, ShadingModel::gooch};
+        ShadingStage s = stage_of(0.3, 0.5, 0.4, kModels[random() % 4]);
+        s.fades = random() % 2, s.gooch.cool_to_light = random() % 2;
+        for (std::size_t side = 0; side < 2; ++side) {
+            s.gooch.share[side] = static_cast<Word>(random() % ((1 << kMaterial) + 1));
+            for (auto& tone : s.gooch.tone) tone[side] = static_cast<Word>(random() % ((1 << kMaterial) + 1));
+        }
         const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-52 - 1; };
         for (int l = static_cast<int>(random() % 3); l >= 0; --l)
             add_light(s, Vec3(unit(), unit(), unit()).normalized(),
@@ -304,8 +385,8 @@ TEST(Shading, IntervalsHoldEveryLitColour) {
             normal[a] = word(kOne), normals[a] = {-kOne, kOne};
             color[a] = std::abs(word(kOne)), colors[a] = {0, kOne};
         }
-        shade(s, ray, normal, std::abs(word(kOne)), color);
-        shade(s, rays, normals, Range{0, kOne}, colors);
+        shade(s, ray, normal, std::abs(word(kOne)), color, std::abs(word(kOne)));
+        shade(s, rays, normals, Range{0, kOne}, colors, Range{0, kOne});
         for (std::size_t a = 0; a < 3; ++a)
             ASSERT_TRUE(colors[a].low <= color[a] && color[a] <= colors[a].high) << i;
     }

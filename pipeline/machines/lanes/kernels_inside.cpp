@@ -1,0 +1,207 @@
+// Light inside slabs, in lanes: gradients between a slab's ends, and slabs in pieces.
+#include "pipeline/machines/lanes/targets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "pipeline/machines/lanes/kernels_inside.cpp"
+#include <hwy/foreach_target.h>
+
+#include "fixedpoint/words/float_lanes-inl.h"
+#include "fixedpoint/words/lane_quotients-inl.h"
+#include "fixedpoint/words/lane_tables-inl.h"
+#include "pipeline/machines/lanes/kernels.h"
+#include "pipeline/stages/inside-inl.h"
+#include "pipeline/stages/location-inl.h"
+
+#include <array>
+#include <bit>
+
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+namespace {
+
+using lanes::kRays;
+using lanes::LitSamples;
+using lanes::Samples;
+using lanes::Word;
+constexpr int kLanes = static_cast<int>(hn::MaxLanes(hn::ScalableTag<Word>()));
+
+template <class L>
+HWY_INLINE std::array<L, 3> load_three(const lanes::Batch (&from)[3], int at) {
+    return {load<L>(from[0].v + at), load<L>(from[1].v + at), load<L>(from[2].v + at)};
+}
+
+/// A word of the plan's as it stands in the buffers.
+Word in_buffer(const Plan& plan, std::int64_t word) {
+    return plan.float32 ? std::bit_cast<Word>(static_cast<float>(word)) : static_cast<Word>(word);
+}
+
+/// Samples at the ends of slabs that may be cut, each once.
+int gather_turning_ends(const Plan& plan, const lanes::RayPacket& rays, int steps, const Samples& s,
+                        LitSamples& ends) {
+    const hn::ScalableTag<Word> d;
+    const auto before_least = hn::Set(d, in_buffer(plan, plan.inside.least_cut) - 1);
+    const bool from_samples = plan.gradient_from_samples();
+    int count = 0;
+    for (int at = 0; at < (steps + 1) * kRays; at += kLanes) {
+        const auto slabs = hn::Load(d, rays.slabs.v + at % kRays);
+        // Of the slab in this row, and of the one in front of it.
+        const auto thick = [&](int place) {
+            const auto within = hn::Gt(slabs, hn::Set(d, s.first + place / kRays));
+            return hn::And(hn::Gt(hn::Load(d, s.alpha.v + place), before_least), within);
+        };
+        auto wanted = hn::Gt(hn::Zero(d), hn::Zero(d));
+        if (at < steps * kRays) wanted = thick(at);
+        if (at >= kRays) wanted = hn::Or(wanted, thick(at - kRays));
+        const auto many = hn::CountTrue(d, wanted);
+        if (many == 0) continue;
+        const auto pack = [&](const Word* from, lanes::Batch& to) {
+            hn::StoreU(hn::Compress(hn::Load(d, from), wanted), d, to.v + count);
+        };
+        hn::StoreU(hn::Compress(hn::Iota(d, at), wanted), d, ends.from.v + count);
+        for (int a = 0; a < 3; ++a) {
+            if (from_samples) {
+                pack(s.location[a].v + at, ends.location[0][a]);
+                continue;
+            }
+            pack(s.cell[a].v + at, ends.cell[0][a]);
+            pack(s.weight[a].v + at, ends.weight[0][a]);
+        }
+        count += static_cast<int>(many);
+    }
+    return count;
+}
+
+/// Of `count` gathered slabs those with so many cuts; the rest up to the next sixteen repeats the last.
+int pick_by_cuts(const Plan& plan, int count, int cuts, const LitSamples& lit, LitSamples& picked) {
+    const hn::ScalableTag<Word> d;
+    const ShadingStage& shading = plan.shading;
+    int many = 0;
+    const auto copy_all = [&](auto&& copy) {
+        copy(lit.from, picked.from), copy(lit.length, picked.length), copy(lit.alpha, picked.alpha);
+        for (int end = 0; end < 2; ++end) {
+            copy(lit.input[end], picked.input[end]);
+            for (int a = 0; a < 3; ++a) copy(lit.location[end][a], picked.location[end][a]);
+        }
+        for (int a = 0; a < 3; ++a) {
+            copy(lit.color[a], picked.color[a]);
+            if (!shading.needs_ray()) continue;
+            copy(lit.view[a], picked.view[a]);
+            for (int l = 0; l < shading.lights; ++l) copy(lit.half[l][a], picked.half[l][a]);
+        }
+    };
+    for (int at = 0; at < count; at += kLanes) {
+        auto wanted = hn::Eq(hn::Load(d, lit.cuts.v + at), hn::Set(d, cuts));
+        wanted = hn::And(wanted, hn::FirstN(d, static_cast<std::size_t>(count - at)));
+        const auto here = hn::CountTrue(d, wanted);
+        if (here == 0) continue;
+        copy_all([&](const lanes::Batch& from, lanes::Batch& to) {
+            hn::StoreU(hn::Compress(hn::Load(d, from.v + at), wanted), d, to.v + many);
+        });
+        many += static_cast<int>(here);
+    }
+    if (many == 0) return 0;
+    copy_all([&](const lanes::Batch&, lanes::Batch& to) {
+        for (int i = many; i % kRays != 0; ++i) to.v[i] = to.v[many - 1];
+    });
+    return many;
+}
+
+/// Places `part` 2^-bits of the way along slabs [at, at + count), to places [to, to + count).
+template <class L>
+void place_between(const Plan& plan, const LitSamples& ends, int at, int count, int part, int bits,
+                   LitSamples& places, int to) {
+    const bool from_samples = plan.gradient_from_samples();
+    for (int i = 0; i < count; i += static_cast<int>(L::count())) {
+        const std::array<L, 3> location =
+            location_between(plan.inside, load_three<L>(ends.location[0], at + i),
+                             load_three<L>(ends.location[1], at + i), part, bits);
+        if (from_samples) {
+            for (std::size_t a = 0; a < 3; ++a) store(location[a], places.location[0][a].v + to + i);
+            continue;
+        }
+        const CellPosition<L> position = cell_position(plan.location, location);
+        for (std::size_t a = 0; a < 3; ++a) {
+            store_whole(position.cell[a], places.cell[0][a].v + to + i);
+            store(position.weight[a], places.weight[0][a].v + to + i);
+        }
+    }
+}
+
+/// Sixteen slabs from `at` on, cut in 2^bits: row i is their part i, between its inputs and the next row's.
+template <class L>
+void cut_sixteen(const Plan& plan, const LitSamples& slabs, int at, int bits, Samples& out) {
+    const InsideStage& s = plan.inside;
+    const int last = 1 << bits;
+    for (int r = 0; r < kRays; r += static_cast<int>(L::count())) {
+        const L front = load<L>(slabs.input[0].v + at + r), back = load<L>(slabs.input[1].v + at + r),
+                length = load<L>(slabs.length.v + at + r);
+        L near_length = constant<L>(0);
+        store(front, out.input.v + r);
+        for (int i = 1; i <= last; ++i) {
+            const L far_length = i == last ? length : length_up_to(s, length, i, bits);
+            store(i == last ? back : input_between(s, front, back, i, bits), out.input.v + i * kRays + r);
+            store(far_length - near_length, out.length.v + (i - 1) * kRays + r);
+            near_length = far_length;
+        }
+    }
+}
+
+/// log2 of the pieces of gathered slabs, whose ends' raw gradients stand in `gradient` by place.
+template <class L>
+void find_cuts(const Plan& plan, int count, const lanes::Batch (&gradient)[3], LitSamples& lit) {
+    const L zero = constant<L>(0), least = constant<L>(plan.inside.least_cut);
+    alignas(64) Word end[2][3][kRays];
+    for (int at = 0; at < count; at += static_cast<int>(L::count())) {
+        for (int i = 0; i < static_cast<int>(L::count()); ++i)
+            for (int a = 0; a < 3; ++a) {
+                const int place = at + i < count ? lit.from.v[at + i] : lit.from.v[at];
+                end[0][a][i] = gradient[a].v[place], end[1][a][i] = gradient[a].v[place + kRays];
+            }
+        const auto load_end = [&](int e) {
+            return std::array<L, 3>{load<L>(end[e][0]), load<L>(end[e][1]), load<L>(end[e][2])};
+        };
+        const L cuts =
+            select(load<L>(lit.alpha.v + at) < least, zero, cuts_between(load_end(0), load_end(1)));
+        store_whole(cuts, lit.cuts.v + at);
+    }
+}
+
+/// Sixteen slabs' lit pieces, piece i in row i, to their straight colours in `slabs` from `at` on.
+template <class L>
+void join_sixteen(const Plan& plan, const LitSamples& pieces, int bits, LitSamples& slabs, int at) {
+    for (int r = 0; r < kRays; r += static_cast<int>(L::count())) {
+        PieceLight<L> sum = no_piece<L>(plan.inside);
+        for (int i = 0; i < 1 << bits; ++i) {
+            const int place = i * kRays + r;
+            add_piece(plan.inside, sum, load_three<L>(pieces.color, place), load<L>(pieces.alpha.v + place));
+        }
+        const std::array<L, 3> color = color_of_pieces(plan.inside, sum);
+        for (std::size_t c = 0; c < 3; ++c) store(color[c], slabs.color[c].v + at + r);
+    }
+}
+
+}  // namespace
+
+void inside_kernels_of(const lanes::StageWays& ways, lanes::StageKernels& kernels) {
+    constexpr KnownRescales kNothing = KnownRescales::nothing;
+    kernels.gather_ends = &gather_turning_ends;
+    kernels.pick_by_cuts = &pick_by_cuts;
+    lanes::with_word<Lanes, kNothing>(ways.location,
+                                      [&]<class L>() { kernels.place_between = &place_between<L>; });
+    lanes::with_word<Lanes, kNothing>(ways.classification, [&]<class L>() { kernels.cut = &cut_sixteen<L>; });
+    lanes::with_word<Lanes, kNothing>(ways.shading, [&]<class L>() {
+        kernels.find_cuts = &find_cuts<L>;
+        kernels.join = &join_sixteen<L>;
+    });
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace squint::lanes {
+void inside_kernels(std::int64_t target, const StageWays& ways, StageKernels& kernels) {
+    SQUINT_CALL_TARGET(target, inside_kernels_of, ways, kernels)
+}
+}  // namespace squint::lanes
+#endif

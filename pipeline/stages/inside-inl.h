@@ -1,0 +1,113 @@
+// The maths of inside.h, over any word; compiled once per SIMD target.
+#if defined(SQUINT_PIPELINE_STAGES_INSIDE_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_PIPELINE_STAGES_INSIDE_INL_H
+#undef SQUINT_PIPELINE_STAGES_INSIDE_INL_H
+#else
+#define SQUINT_PIPELINE_STAGES_INSIDE_INL_H
+#endif
+
+#include "pipeline/stages/inside.h"
+
+#include "fixedpoint/unrolled-inl.h"
+#include "pipeline/classification/prefix-inl.h"
+
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+
+/// The location `part` 2^-bits of the way from a slab's front to its back, rounded once.
+template <class W>
+HWY_INLINE std::array<W, 3> location_between(const InsideStage& s, const std::array<W, 3>& front,
+                                             const std::array<W, 3>& back, int part, int bits) {
+    std::array<W, 3> between;
+    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+        const W apart = within(back[a] - front[a], -s.most_apart[a], s.most_apart[a]);
+        const W way = quantise(apart * constant<W>(part), s.to_location[static_cast<std::size_t>(bits)]);
+        between[a] = affine(front[a], constant<W>(1), way, 0, s.limit[a]);
+    });
+    return between;
+}
+/// The input there on the straight line that a slab stands for.
+template <class W>
+HWY_INLINE W input_between(const InsideStage& s, W front, W back, int part, int bits) {
+    const W way = quantise((back - front) * constant<W>(part), s.to_input[static_cast<std::size_t>(bits)]);
+    return within(front + way, 0, s.highest_input);
+}
+/// The length of a slab up to there.
+template <class W>
+HWY_INLINE W length_up_to(const InsideStage& s, W length, int part, int bits) {
+    return quantise(length * constant<W>(part), s.to_length[static_cast<std::size_t>(bits)]);
+}
+
+/// A gradient with its largest component shifted to kTurnBits bits, and its length's floor.
+inline constexpr int kTurnBits = 12;
+template <class W>
+struct Turn {
+    std::array<W, 3> gradient;
+    W length;
+};
+template <class W>
+HWY_INLINE Turn<W> turn_of(const std::array<W, 3>& gradient) {
+    const W zero = constant<W>(0);
+    std::array<W, 3> size;
+    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT { size[a] = absolute(gradient[a]); });
+    const W shift = constant<W>(kTurnBits) - bit_length(max(max(size[0], size[1]), size[2]));
+    Turn<W> turn;
+    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+        size[a] = within(shift_by(size[a], shift), 0, (std::int64_t{1} << kTurnBits) - 1);
+        turn.gradient[a] = select(gradient[a] < zero, zero - size[a], size[a]);
+    });
+    turn.length = vector_length(size, 0);
+    return turn;
+}
+template <RealWord W>
+HWY_INLINE Turn<W> turn_of(const std::array<W, 3>& g) {
+    return {g, square_root(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])};
+}
+/// log2 of the pieces in which a slab is lit whose ends have these raw gradients: one up to 14.4 degrees
+/// (cosine 31/32), two up to 44.0 (23/32), else four; one where either is zero.  Error of an angle: 0.1
+/// degrees.
+template <class W>
+HWY_INLINE W cuts_between(const std::array<W, 3>& front, const std::array<W, 3>& back) {
+    const Turn<W> f = turn_of(front), b = turn_of(back);
+    const W dot = shift_left(
+        f.gradient[0] * b.gradient[0] + f.gradient[1] * b.gradient[1] + f.gradient[2] * b.gradient[2], 5);
+    const W lengths = f.length * b.length;
+    const W zero = constant<W>(0), one = constant<W>(1), two = constant<W>(2);
+    return select(dot < constant<W>(23) * lengths, two, select(dot < constant<W>(31) * lengths, one, zero));
+}
+
+/// The light of a slab's pieces, front to back, as their straight colour.
+template <class W>
+struct PieceLight {
+    std::array<W, 3> light;
+    W through;  // what the pieces so far let pass
+};
+template <class W>
+HWY_INLINE PieceLight<W> no_piece(const InsideStage& s) {
+    const W zero = constant<W>(0);
+    return {{zero, zero, zero}, constant<W>(s.one_alpha)};
+}
+/// Adds a lit piece of straight colour.
+template <class W>
+HWY_INLINE void add_piece(const InsideStage& s, PieceLight<W>& sum, const std::array<W, 3>& color, W alpha) {
+    const W part = min(quantise(sum.through * alpha, s.to_part), sum.through);
+    for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
+        sum.light[c] = affine(sum.light[c], part, color[c], 0, s.one_alpha * s.largest_lit);
+    });
+    sum.through = within(sum.through - part, 0, s.one_alpha);
+}
+template <class W>
+HWY_INLINE std::array<W, 3> color_of_pieces(const InsideStage& s, const PieceLight<W>& sum) {
+    const W seen = max(constant<W>(s.one_alpha) - sum.through, constant<W>(1));
+    std::array<W, 3> color;
+    for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
+        color[c] = min(divide(sum.light[c], seen, s.to_whole), constant<W>(s.largest_lit));
+    });
+    return color;
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif

@@ -1,0 +1,50 @@
+#include "pipeline/stages/inside.h"
+
+#include "pipeline/stages/inputs.h"
+#include "pipeline/stages/location.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace squint {
+namespace {
+
+// Of a way along a slab, which may lead back.
+Rescale to_way(const StageInputs& in, Wire wire, int bits) {
+    Spec spec = in.specs[wire];
+    spec.format.is_signed = true, spec.overflow = Overflow::sat;
+    return Rescale(fraction(in, wire) + bits, spec, wire_index(wire));
+}
+
+}  // namespace
+
+InsideStage build_inside(const StageInputs& in, const LocationStage& location) {
+    InsideStage s;
+    s.rule = in.inside;
+    for (int b = 0; b < static_cast<int>(s.to_location.size()); ++b)
+        s.to_location[static_cast<std::size_t>(b)] = to_way(in, Wire::location, b);
+    for (int b = 0; b <= kMostCuts; ++b) {
+        const auto at = static_cast<std::size_t>(b);
+        s.to_input[at] = to_way(in, Wire::classification_input, b);
+        s.to_length[at] = rescale(in, fraction(in, Wire::length) + b, Wire::length);
+    }
+    // A slab's ends are a step apart, and what rounding moved them by.
+    const double apart = in.scene.sampling.step + 2 * location.drift() + 1;
+    const auto one = static_cast<double>(in.specs[Wire::location].format.one());
+    s.limit = location.limit;
+    for (std::size_t a = 0; a < 3; ++a)
+        s.most_apart[a] =
+            static_cast<std::int64_t>(std::min(static_cast<double>(s.limit[a]), std::ceil(apart * one)));
+    s.highest_input = static_cast<std::int64_t>(in.entries.size() - 1)
+                      << fraction(in, Wire::classification_input);
+    s.one_alpha = in.specs[Wire::slab_alpha].format.one();
+    s.largest_lit = in.specs[Wire::lit_color].format.largest();
+    s.least_cut = std::max<std::int64_t>(s.one_alpha >> 10, 32);
+    s.to_part = rescale(in, 2 * fraction(in, Wire::slab_alpha), Wire::slab_alpha);
+    // Of no wire: intervals do not see that a mean of lit colours needs no limit, and would give lit_color one.
+    s.to_whole = Rescale(fraction(in, Wire::lit_color), in.specs[Wire::lit_color]);
+    s.to_whole.divides = true;
+    return s;
+}
+
+}  // namespace squint

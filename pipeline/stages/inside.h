@@ -1,0 +1,52 @@
+// Light inside a slab: where its gradients are taken (shading.inside), and how a slab in which the surface
+// turns is lit in pieces.  CONVENTIONS.md, "Light"; docs/papers/guetat.md.
+//
+//     mean       the mean of the raw gradients at both ends
+//     front      the front end's
+//     middle     one, sampled at the slab's middle
+//     adaptive   by the angle between the ends' gradients 1, 2 or 4 pieces, each a slab of the method's own
+//                tables with a gradient sampled at its middle
+#pragma once
+
+#include "fixedpoint/words.h"
+#include "scene/scene.h"
+
+#include <array>
+#include <cstdint>
+
+namespace squint {
+
+/// A slab is cut in 2^kMostCuts pieces at most.
+inline constexpr int kMostCuts = 2;
+
+struct InsideStage {
+    InsideRule rule = InsideRule::mean;
+    // Of places k 2^-b along a slab, by b: a piece's middle needs one bit more than its ends.
+    std::array<Rescale, kMostCuts + 2> to_location;
+    std::array<Rescale, kMostCuts + 1> to_input, to_length;
+    std::array<std::int64_t, 3> most_apart{};  // a slab's ends, as locations
+    std::array<std::int64_t, 3> limit{};       // the last voxel centre
+    std::int64_t highest_input = 0;
+    std::int64_t least_cut = 0;  // opacity from which on a slab is worth cutting: 2^-10, or 32 last bits
+    std::int64_t one_alpha = 0, largest_lit = 0;
+    Rescale to_part;   // of the light behind earlier pieces
+    Rescale to_whole;  // pieces' light over their opacity
+
+    bool needs_back() const { return rule != InsideRule::front; }
+    /// Whether gradients are sampled between a slab's ends.
+    bool samples_between() const { return rule == InsideRule::middle || rule == InsideRule::adaptive; }
+
+    template <class V>
+    void visit(V&& v) {
+        for (Rescale& r : to_location) v(r);
+        for (Rescale& r : to_input) v(r);
+        for (Rescale& r : to_length) v(r);
+        v(to_part), v(to_whole);
+    }
+};
+
+struct LocationStage;
+struct StageInputs;
+InsideStage build_inside(const StageInputs& in, const LocationStage& location);
+
+}  // namespace squint
