@@ -1,7 +1,7 @@
 #include "fixedpoint/words/tally.h"
 
 #include <algorithm>
-#include <bit>
+#include <functional>
 
 namespace squint {
 
