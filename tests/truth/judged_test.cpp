@@ -377,7 +377,7 @@ TEST(Judged, EveryWireOfFewBitsEndsInAPictureOrALine) {
         volume_of({5, 5, 5}, 4, Vec3(1), [](const Index3& p) { return (p.x + p.y * p.z) % 16; });
     int pictures = 0, refused = 0;
     for (const std::string preset : {"default", "eight_bit"})
-        for (int form = 0; form < 7; ++form)
+        for (int form = 0; form < static_cast<int>(std::size(EnumNames<CompositingForm>::names)); ++form)
             for (int w = 0; w < kWires; ++w)
                 for (int fraction = 0; fraction < 3; ++fraction)
                     for (const int integer : {0, 1, 4}) {
