@@ -99,6 +99,18 @@ HWY_INLINE auto is_opaque(const EntryLookup& e, const EntryPosition<W>& at) {
            ((at.fraction == one) & (zero < next_bit));
 }
 
+/// Between rows `row` and `row + 1` of a table of four columns: red, green, blue, alpha.
+template <class W>
+HWY_INLINE std::array<W, 4> lerp_rows(const Table& table, W row, W weight, int weight_bits,
+                                      const Rescale& to_color, const Rescale& to_alpha) {
+    std::array<W, 4> between;
+    for (int c = 0; c < 4; ++c)
+        between[static_cast<std::size_t>(c)] = quantise(
+            blend(gather(table, row, c), gather(table, row + constant<W>(1), c), weight, weight_bits),
+            c < 3 ? to_color : to_alpha);
+    return between;
+}
+
 /// A full step's depth times the length of a slab, exact, then rounded once.
 template <class W>
 HWY_INLINE W shortened(W depth, W length, int length_fraction, const Rescale& to_shorter) {

@@ -7,9 +7,7 @@
 #include <hwy/foreach_target.h>
 
 #include "fixedpoint/words.h"
-#include "fixedpoint/words/float_lanes-inl.h"
-#include "fixedpoint/words/lane_quotients-inl.h"
-#include "fixedpoint/words/lane_tables-inl.h"
+#include "fixedpoint/words/all_lanes-inl.h"
 #include "pipeline/classification/entries-inl.h"
 
 #include <bit>

@@ -5,9 +5,7 @@
 #define HWY_TARGET_INCLUDE "pipeline/machines/lanes/kernels_classification.cpp"
 #include <hwy/foreach_target.h>
 
-#include "fixedpoint/words/float_lanes-inl.h"
-#include "fixedpoint/words/lane_quotients-inl.h"
-#include "fixedpoint/words/lane_tables-inl.h"
+#include "fixedpoint/words/all_lanes-inl.h"
 #include "pipeline/classification/methods-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
 

@@ -1,5 +1,5 @@
 // Interval arithmetic on words: proves how wide a stage's exact results are.
-#include "fixedpoint/words.h"
+#include "fixedpoint/words/range.h"
 
 namespace squint {
 

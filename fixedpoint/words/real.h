@@ -1,0 +1,142 @@
+// Numbers that are not rounded: raw units in floating point, where shifts are exact multiplications.
+#pragma once
+
+#include "fixedpoint/audit.h"
+#include "fixedpoint/words/word.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace squint {
+
+/// A real number in raw units (value * 2^F of its wire): no rounding but where a wire's Rescale is active,
+/// which is how one stage alone is put into fixed point.
+template <class T>
+struct Real {
+    using IsReal = void;
+    T v = 0;
+    static constexpr Real from(double raw) { return {static_cast<T>(raw)}; }
+    friend constexpr Real operator+(Real a, Real b) { return {a.v + b.v}; }
+    friend constexpr Real operator-(Real a, Real b) { return {a.v - b.v}; }
+    friend constexpr Real operator*(Real a, Real b) { return {a.v * b.v}; }
+    friend constexpr Real operator/(Real a, Real b) { return {a.v / b.v}; }
+    friend constexpr bool operator==(Real a, Real b) { return a.v == b.v; }
+    friend constexpr bool operator<(Real a, Real b) { return a.v < b.v; }
+};
+/// 2^bits, |bits| < 1000.
+template <class T>
+constexpr T power_of_two(int bits) {
+    return bits >= 0 ? (bits < 63 ? static_cast<T>(std::uint64_t{1} << bits)
+                                  : power_of_two<T>(bits - 62) * power_of_two<T>(62))
+                     : 1 / power_of_two<T>(-bits);
+}
+template <class T>
+constexpr Real<T> make_word(WordTag<Real<T>>, std::int64_t value) {
+    return {static_cast<T>(value)};
+}
+template <class T>
+constexpr Real<T> shift_left(Real<T> x, int bits) {
+    return {x.v * power_of_two<T>(bits)};
+}
+template <class T>
+Real<T> floor_shift(Real<T> x, int bits) {
+    return {std::floor(x.v * power_of_two<T>(-bits))};
+}
+template <class T>
+constexpr Real<T> min(Real<T> a, Real<T> b) {
+    return b < a ? b : a;
+}
+template <class T>
+constexpr Real<T> max(Real<T> a, Real<T> b) {
+    return a < b ? b : a;
+}
+template <class T>
+Real<T> absolute(Real<T> x) {
+    return {std::abs(x.v)};
+}
+template <class T>
+Real<T> square_root(Real<T> x) {
+    return {std::sqrt(x.v)};
+}
+/// 2^x of whole numbers, -127 < x < 128.
+template <class T>
+Real<T> whole_power_of_two(Real<T> x) {
+    return {power_of_two<T>(static_cast<int>(x.v))};
+}
+template <class T>
+constexpr Real<T> select(bool c, Real<T> yes, Real<T> no) {
+    return c ? yes : no;
+}
+template <class T>
+constexpr std::int64_t to_index(Real<T> x) {
+    return static_cast<std::int64_t>(x.v);
+}
+template <class T>
+constexpr double to_double(Real<T> x) {
+    return static_cast<double>(x.v);
+}
+template <class T>
+Real<T> gather(const Table& t, Real<T> row, int column) {
+    const auto at = static_cast<std::int64_t>(row.v);
+    return {static_cast<T>(t.active ? static_cast<double>(t.word(at, column)) : t.exact(at, column))};
+}
+template <class T>
+constexpr Real<T> blend(Real<T> a, Real<T> b, Real<T> w, int bits) {
+    return {a.v * power_of_two<T>(bits) + w.v * (b.v - a.v)};
+}
+template <class T>
+constexpr Real<T> affine(Real<T> p, Real<T> k, Real<T> v, std::int64_t, std::int64_t) {
+    return {p.v + k.v * v.v};
+}
+template <class T>
+constexpr Real<T> within(Real<T> x, std::int64_t, std::int64_t) {
+    return x;
+}
+/// Of whole numbers.
+template <class T>
+Real<T> bit_length(Real<T> x) {
+    int bits = 0;
+    if (x.v > 0) std::frexp(x.v, &bits);
+    return {static_cast<T>(bits)};
+}
+template <class T>
+Real<T> shift_by(Real<T> x, Real<T> bits) {
+    return {std::floor(x.v * power_of_two<T>(static_cast<int>(bits.v)))};
+}
+/// For traces: a wire's value without its rounding.
+template <class T>
+Real<T> traced(Real<T> value, const Rescale& to) {
+    if (to.statistics && to.statistics->trace) {
+        const double nearest = std::floor(static_cast<double>(value.v) + 0.5);
+        to.statistics->trace->push_back(
+            {to.wire, static_cast<double>(value.v), static_cast<std::int64_t>(nearest)});
+    }
+    return value;
+}
+template <class T>
+Real<T> quantise(Real<T> x, const Rescale& to) {
+    const T scaled = x.v * power_of_two<T>(-to.shift);
+    if (!to.active) return traced(Real<T>{scaled}, to);
+    // Exact for |scaled| < 2^52: the fraction of a double is a double.
+    const T below = std::floor(scaled), rest = scaled - below;
+    T rounded = below;
+    if (to.rounding == Rounding::rnd && rest >= T(0.5)) rounded += 1;
+    if (to.rounding == Rounding::rnd_conv &&
+        (rest > T(0.5) || (rest == T(0.5) && std::fmod(below, T(2)) != 0)))
+        rounded += 1;
+    if (to.rounding == Rounding::trn_zero && rest > 0 && below < 0) rounded += 1;
+    if (!to.wraps)
+        return {std::min(std::max(rounded, static_cast<T>(to.lowest)), static_cast<T>(to.highest))};
+    return {static_cast<T>(limit(static_cast<Int128>(rounded), to))};
+}
+template <class T>
+Real<T> quotient(Real<T> numerator, Real<T> denominator, const Rescale& to) {
+    Rescale raw = to;
+    raw.shift = 0;
+    return quantise(Real<T>{numerator.v * power_of_two<T>(-to.shift) / denominator.v}, raw);
+}
+
+static_assert(Word<Real<double>> && Word<Real<float>> && RealWord<Real<double>>);
+
+}  // namespace squint
