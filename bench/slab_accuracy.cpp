@@ -98,7 +98,7 @@ std::vector<DrawnSlab> drawn(int size, double reach, int count) {
     return slabs;
 }
 
-using SlabMethod = std::function<SlabValue(const DrawnSlab&)>;
+using SlabFunction = std::function<SlabValue(const DrawnSlab&)>;
 
 SlabValue without_self_attenuation(const PrefixTables& tables, const DrawnSlab& slab) {
     const Moments moments = tables.moments(slab.front, slab.back, slab.length, 1);
@@ -109,7 +109,7 @@ SlabValue without_self_attenuation(const PrefixTables& tables, const DrawnSlab& 
 
 /// A method whose tables are made for one length: one set for each of the four.
 template <class Build>
-SlabMethod for_each_length(const Build& build) {
+SlabFunction for_each_length(const Build& build) {
     using Tables = decltype(build(1.0));
     auto tables = std::make_shared<std::vector<Tables>>();
     for (int i = 0; i < 4; ++i) tables->push_back(build(0.25 * (1 << i)));
@@ -119,13 +119,13 @@ SlabMethod for_each_length(const Build& build) {
     };
 }
 
-std::vector<std::pair<std::string, SlabMethod>> methods(const Entries& entries) {
-    std::vector<std::pair<std::string, SlabMethod>> list;
+std::vector<std::pair<std::string, SlabFunction>> methods(const Entries& entries) {
+    std::vector<std::pair<std::string, SlabFunction>> list;
     const auto add = [&](const std::string& name, auto method) {
         list.emplace_back(name, [=](const DrawnSlab& s) { return method.slab(s.front, s.back, s.length); });
     };
-    add("PC", preintegration::PostClassification{entries, Sample::front});
-    add("PC middle", preintegration::PostClassification{entries, Sample::middle});
+    add("PC", preintegration::RealPostClassification{entries, Sample::front});
+    add("PC middle", preintegration::RealPostClassification{entries, Sample::middle});
     list.emplace_back("PI1D Kye",
                       for_each_length([&](double d) { return build_pi1d(entries, d, MeanOf::opacity_kye); }));
     list.emplace_back("PI1D Engel", for_each_length([&](double d) {
@@ -147,9 +147,9 @@ std::vector<std::pair<std::string, SlabMethod>> methods(const Entries& entries) 
 
 /// The same in fixed point: tables and words of a preset, built for each of the four lengths.  What a method
 /// refuses is left out.
-std::vector<std::pair<std::string, SlabMethod>> methods_in_words(const Entries& entries,
-                                                                 const std::string& preset) {
-    std::vector<std::pair<std::string, SlabMethod>> list;
+std::vector<std::pair<std::string, SlabFunction>> methods_in_words(const Entries& entries,
+                                                                   const std::string& preset) {
+    std::vector<std::pair<std::string, SlabFunction>> list;
     for (const cases::MethodCase& which : cases::all_methods()) {
         const bool table =
             which.method == squint::Method::pi2d || which.method == squint::Method::pi2d_no_attenuation;
@@ -173,7 +173,7 @@ struct Error {
     double color_rms, color_max, alpha_rms, alpha_max;
 };
 
-Error measured(const SlabMethod& method, const std::vector<DrawnSlab>& slabs,
+Error measured(const SlabFunction& method, const std::vector<DrawnSlab>& slabs,
                const std::vector<SlabValue>& truth) {
     Error error{};
     for (std::size_t i = 0; i < slabs.size(); ++i) {
@@ -270,7 +270,7 @@ int main(int argc, char** argv) {
             int count;
         };
         const auto list = functions(size);
-        std::vector<std::vector<std::pair<std::string, SlabMethod>>> built;
+        std::vector<std::vector<std::pair<std::string, SlabFunction>>> built;
         for (const auto& function : list)
             built.push_back(preset.empty() ? methods(function.entries)
                                            : methods_in_words(function.entries, preset));

@@ -8,7 +8,7 @@ namespace squint::preintegration {
 
 enum class Sample { front, middle };
 
-struct PostClassification {
+struct RealPostClassification {
     Entries entries;
     Sample sample = Sample::front;
 

@@ -15,7 +15,7 @@ PreIntegrated1D build_pre_integrated_1d(const ClassificationInputs& in) {
     m.prefix = build_prefix_lookup(in);
     m.premultiplied = build_premultiplied_rules(in.specs);
     m.is_opacity = in.settings.method == Method::pi1d;
-    const preintegration::PreIntegrated1D tables = preintegration::build_pi1d(
+    const preintegration::RealPreIntegrated1D tables = preintegration::build_pi1d(
         in.entries, in.step_world, m.is_opacity ? MeanOf::opacity_kye : MeanOf::clamped_extinction_engel);
     const Spec sum = in.specs[Wire::table_moment];
     require_range(in.specs, Wire::table_moment, tables.sum.back(),

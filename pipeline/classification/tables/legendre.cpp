@@ -104,7 +104,7 @@ SlabValue LegendreSeries::in_pieces(double front, double back, double length, do
 }
 
 SlabValue LegendreSeries::slab(double front, double back, double length) const {
-    const CutSlab cut = cut_at_opaque(entries, prediction, front, back, length);
+    const RealCutSlab cut = cut_at_opaque(entries, prediction, front, back, length);
     if (cut.wall && cut.length == 0) return {cut.wall_color, 1};
     if (cut.front == cut.back) return point_slab(entries, cut.front, cut.length);
     const double fine_front = cut.front * per_entry, fine_back = cut.back * per_entry;

@@ -30,13 +30,13 @@ std::optional<double> OpaquePrediction::first(double front, double back) const {
     return std::nullopt;
 }
 
-SlabValue CutSlab::over_wall(const SlabValue& part) const {
+SlabValue RealCutSlab::over_wall(const SlabValue& part) const {
     if (!wall) return part;
     return {part.color + wall_color * (1 - part.alpha), 1};
 }
 
-CutSlab cut_at_opaque(const Entries& entries, const OpaquePrediction& prediction, double front, double back,
-                      double length) {
+RealCutSlab cut_at_opaque(const Entries& entries, const OpaquePrediction& prediction, double front,
+                          double back, double length) {
     front = clamped_coordinate(entries, front);
     back = clamped_coordinate(entries, back);
     if (!prediction.any) return {front, back, length};

@@ -21,7 +21,7 @@ struct OpaquePrediction {
 OpaquePrediction predict_opaque(const Entries& entries);
 
 /// A slab cut at its first opaque coordinate: its translucent part, and the wall behind it.
-struct CutSlab {
+struct RealCutSlab {
     double front, back,
         length;  // the part before the wall, with the whole slab's rate; length 0 when the front is opaque
     bool wall = false;
@@ -32,7 +32,7 @@ struct CutSlab {
 };
 
 /// Clamps both ends to the entries and cuts.
-CutSlab cut_at_opaque(const Entries& entries, const OpaquePrediction& prediction, double front, double back,
-                      double length);
+RealCutSlab cut_at_opaque(const Entries& entries, const OpaquePrediction& prediction, double front,
+                          double back, double length);
 
 }  // namespace squint::preintegration

@@ -40,7 +40,7 @@ SlabValue with_length_ratio(const SlabValue& slab, double ratio) {
     return {slab.color * (alpha / slab.alpha), alpha};
 }
 
-SlabValue PreIntegrated1D::slab(double front, double back, double slab_length) const {
+SlabValue RealPreIntegrated1D::slab(double front, double back, double slab_length) const {
     const double last = static_cast<double>(value.size() - 1);
     front = std::clamp(front, 0.0, last);
     back = std::clamp(back, 0.0, last);
@@ -55,8 +55,8 @@ SlabValue PreIntegrated1D::slab(double front, double back, double slab_length) c
     return with_length_ratio(result, slab_length / length);
 }
 
-PreIntegrated1D build_pi1d(const Entries& entries, double length, MeanOf mean) {
-    PreIntegrated1D tables{.mean = mean, .length = length};
+RealPreIntegrated1D build_pi1d(const Entries& entries, double length, MeanOf mean) {
+    RealPreIntegrated1D tables{.mean = mean, .length = length};
     for (const Entry& entry : entries.entry) {
         const double depth = entry.extinction * length;
         const double value = entry.opaque                  ? 1

@@ -16,7 +16,7 @@ namespace squint::preintegration {
 
 enum class MeanOf { opacity_kye, clamped_extinction_engel };
 
-struct PreIntegrated1D {
+struct RealPreIntegrated1D {
     MeanOf mean = MeanOf::opacity_kye;
     double length = 1;            // world units: the tables are for slabs of this length
     std::vector<double> value{};  // a_i or min(tau_i d, 1)
@@ -30,7 +30,7 @@ struct PreIntegrated1D {
 
 /// Opaque entries count as a_i = 1 (Kye) or tau_i d = 1 (Engel): these methods lose thin walls unless a
 /// prediction cuts the slab.
-PreIntegrated1D build_pi1d(const Entries& entries, double length, MeanOf mean);
+RealPreIntegrated1D build_pi1d(const Entries& entries, double length, MeanOf mean);
 
 /// The same matter over `ratio` times the length it was integrated for; opaque stays opaque.
 SlabValue with_length_ratio(const SlabValue& slab, double ratio);

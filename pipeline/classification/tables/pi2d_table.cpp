@@ -279,16 +279,16 @@ struct Worker {
     std::vector<std::byte> scratch;
 };
 
-PreIntegrated2D empty_table(const Entries& entries, int size, double length) {
+RealPreIntegrated2D empty_table(const Entries& entries, int size, double length) {
     assert(size >= 2 && entries.size() >= 2);
-    PreIntegrated2D table{.size = size, .entries = entries.size(), .length = length};
+    RealPreIntegrated2D table{.size = size, .entries = entries.size(), .length = length};
     table.cell.resize(static_cast<std::size_t>(size) * size * 4);
     return table;
 }
 
 /// Fills every cell with `slab(front, back)`.
 template <class SlabOf>
-void fill(PreIntegrated2D& table, const SlabOf& slab) {
+void fill(RealPreIntegrated2D& table, const SlabOf& slab) {
     oneapi::tbb::parallel_for(0, table.size, [&](int f) {
         for (int b = 0; b < table.size; ++b) {
             const SlabValue value = slab(node_coordinate(f, table.size, table.entries),
@@ -321,8 +321,8 @@ void EncodeU16::operator()(int, std::span<const double> values, std::span<std::u
     encode_u16(values.data(), static_cast<int>(values.size()), fraction_bits, words.data());
 }
 
-PreIntegrated2D build_pi2d(const Entries& entries, int size, double length) {
-    PreIntegrated2D table = empty_table(entries, size, length);
+RealPreIntegrated2D build_pi2d(const Entries& entries, int size, double length) {
+    RealPreIntegrated2D table = empty_table(entries, size, length);
     const auto copy = [](int, std::span<const double> values, std::span<double> words) {
         std::copy(values.begin(), values.end(), words.begin());
     };
@@ -330,18 +330,18 @@ PreIntegrated2D build_pi2d(const Entries& entries, int size, double length) {
     return table;
 }
 
-PreIntegrated2D build_pi2d_direct(const Entries& entries, int size, double length) {
-    PreIntegrated2D table = empty_table(entries, size, length);
+RealPreIntegrated2D build_pi2d_direct(const Entries& entries, int size, double length) {
+    RealPreIntegrated2D table = empty_table(entries, size, length);
     fill(table, [&](double front, double back) { return exact_slab(entries, front, back, length); });
     return table;
 }
 
-PreIntegrated2D build_pi2d_without_self_attenuation(const Entries& entries, int size, double length) {
-    PreIntegrated2D table = empty_table(entries, size, length);
+RealPreIntegrated2D build_pi2d_without_self_attenuation(const Entries& entries, int size, double length) {
+    RealPreIntegrated2D table = empty_table(entries, size, length);
     const OpaquePrediction prediction = predict_opaque(entries);
     const PrefixTables tables = build_prefix_tables(entries, 1);
     fill(table, [&](double front, double back) -> SlabValue {
-        const CutSlab cut = cut_at_opaque(entries, prediction, front, back, length);
+        const RealCutSlab cut = cut_at_opaque(entries, prediction, front, back, length);
         if (cut.wall && cut.length == 0) return {cut.wall_color, 1};
         if (cut.front == cut.back) return point_slab(entries, cut.front, cut.length);
         const Moments moments = tables.moments(cut.front, cut.back, cut.length, 1);
@@ -352,7 +352,7 @@ PreIntegrated2D build_pi2d_without_self_attenuation(const Entries& entries, int 
     return table;
 }
 
-SlabValue PreIntegrated2D::slab(double front, double back, double slab_length) const {
+SlabValue RealPreIntegrated2D::slab(double front, double back, double slab_length) const {
     const double scale = static_cast<double>(size - 1) / (entries - 1);
     const double f = std::clamp(front * scale, 0.0, size - 1.0),
                  b = std::clamp(back * scale, 0.0, size - 1.0);

@@ -25,7 +25,7 @@ namespace squint::preintegration {
 
 enum class Lookup { nearest, bilinear };
 
-struct PreIntegrated2D {
+struct RealPreIntegrated2D {
     int size = 0;
     int entries = 0;
     double length = 1;           // world units: the cells are for slabs of this length
@@ -38,14 +38,14 @@ struct PreIntegrated2D {
 };
 
 /// Straight from the definition, one exact_slab per cell, O(size^2 entries): the oracle.
-PreIntegrated2D build_pi2d_direct(const Entries& entries, int size, double length);
+RealPreIntegrated2D build_pi2d_direct(const Entries& entries, int size, double length);
 
 /// Alpha exact, colour without self-attenuation: C = r (X_1(b) - X_1(f)) (Engel 2001; Lee & Shin, equation
 /// 10), never above alpha.
-PreIntegrated2D build_pi2d_without_self_attenuation(const Entries& entries, int size, double length);
+RealPreIntegrated2D build_pi2d_without_self_attenuation(const Entries& entries, int size, double length);
 
 /// The exact table in O(size^2), in double.
-PreIntegrated2D build_pi2d(const Entries& entries, int size, double length);
+RealPreIntegrated2D build_pi2d(const Entries& entries, int size, double length);
 
 /// Computes diagonals; one per thread.
 class Pi2dDiagonal {

@@ -96,7 +96,7 @@ Vec3 power_series_color(const Moments& moments, int order) {
 }
 
 SlabValue PowerSeries::slab(double front, double back, double length) const {
-    const CutSlab cut = cut_at_opaque(entries, prediction, front, back, length);
+    const RealCutSlab cut = cut_at_opaque(entries, prediction, front, back, length);
     if (cut.wall && cut.length == 0) return {cut.wall_color, 1};
     if (cut.front == cut.back) return point_slab(entries, cut.front, cut.length);
     const Moments moments = tables.moments(cut.front, cut.back, cut.length, order);

@@ -15,7 +15,7 @@ using cases::constant;
 using cases::grey;
 using cases::make_opaque;
 
-double largest_difference(const PreIntegrated2D& a, const PreIntegrated2D& b) {
+double largest_difference(const RealPreIntegrated2D& a, const RealPreIntegrated2D& b) {
     double largest = 0;
     for (std::size_t i = 0; i < a.cell.size(); ++i) {
         if (!(std::abs(a.cell[i] - b.cell[i]) <= largest)) largest = std::abs(a.cell[i] - b.cell[i]);
@@ -84,7 +84,7 @@ TEST(PreIntegrated2D, FastBuildOfFourThousandEntriesEqualsTheDefinitionInDrawnCe
 
 TEST(PreIntegrated2D, WordsAreTheRoundedDoubles) {
     const Entries entries = walls(64);
-    const PreIntegrated2D table = build_pi2d(entries, 64, 1);
+    const RealPreIntegrated2D table = build_pi2d(entries, 64, 1);
     std::vector<std::uint16_t> words(table.cell.size(), 12345);
     build_pi2d_words<std::uint16_t>(entries, 64, 1, words, EncodeU16{15});
     for (std::size_t i = 0; i < words.size(); ++i)
@@ -93,7 +93,7 @@ TEST(PreIntegrated2D, WordsAreTheRoundedDoubles) {
 
 TEST(PreIntegrated2D, ColorStaysBetweenZeroAndAlpha) {
     for (const Entries& entries : {walls(64), cases::noise(64, 2, 20, 26)}) {
-        for (const PreIntegrated2D& table :
+        for (const RealPreIntegrated2D& table :
              {build_pi2d(entries, 64, 2), build_pi2d_without_self_attenuation(entries, 64, 2)}) {
             for (std::size_t i = 0; i < table.cell.size(); ++i) {
                 ASSERT_GE(table.cell[i], 0);
@@ -114,7 +114,7 @@ TEST(PreIntegrated2D, WithoutSelfAttenuationEqualsTheExactTableWhereMatterIsThin
 
 TEST(PreIntegrated2D, LookupReturnsTheCellsAtNodesAndTheirMeanBetween) {
     const Entries entries = cases::noise(64, 0.1, 2, 27);
-    PreIntegrated2D table = build_pi2d(entries, 64, 1);
+    RealPreIntegrated2D table = build_pi2d(entries, 64, 1);
     const SlabValue exact = exact_slab(entries, 20, 31, 1);
     EXPECT_NEAR(table.slab(20, 31, 1).color.y, exact.color.y, kBuildError);
     const double mean = (table.slab(20, 31, 1).alpha + table.slab(20, 32, 1).alpha) / 2;
@@ -125,7 +125,7 @@ TEST(PreIntegrated2D, LookupReturnsTheCellsAtNodesAndTheirMeanBetween) {
 
 TEST(PreIntegrated2D, AnotherLengthIsExactInAlpha) {
     const Entries entries = cases::noise(64, 0.1, 2, 28);
-    const PreIntegrated2D table = build_pi2d(entries, 64, 1);
+    const RealPreIntegrated2D table = build_pi2d(entries, 64, 1);
     for (const double length : {0.25, 0.9, 1.5})
         EXPECT_NEAR(table.slab(10, 41, length).alpha, exact_slab(entries, 10, 41, length).alpha, kBuildError)
             << length;

@@ -131,7 +131,7 @@ TEST(OpaquePrediction, KeepsTheRateOfTheWholeSlab) {
     make_opaque(entries, 101, grey(0));
     entries.entry[99].color = grey(0);
     const OpaquePrediction prediction = predict_opaque(entries);
-    const CutSlab cut = cut_at_opaque(entries, prediction, 90, 130, 1);
+    const RealCutSlab cut = cut_at_opaque(entries, prediction, 90, 130, 1);
     EXPECT_TRUE(cut.wall);
     EXPECT_DOUBLE_EQ(cut.back, 100);
     EXPECT_DOUBLE_EQ(cut.length, 0.25);
@@ -195,7 +195,7 @@ TEST(PowerSeries, OfConstantColorIsThatColorTimesAlpha) {
 TEST(PowerSeries, OfEqualEndsIsThePointItself) {
     const Entries entries = cases::noise(64, 0.1, 10, 9);
     const PowerSeries method = build_power_series(entries, 3);
-    const PostClassification point{entries};
+    const RealPostClassification point{entries};
     for (double s = 0; s <= 63; s += 0.375)
         EXPECT_EQ(largest_difference(method.slab(s, s, 0.5), point.slab(s, s, 0.5)), 0);
 }
@@ -310,14 +310,14 @@ TEST(PrefixTables, SubdividedTablesAreTheSameFunction) {
 TEST(PreIntegrated1D, LosesAThinWallByTheNumberOfEntries) {
     Entries entries = constant(256, 0, 0.5);
     make_opaque(entries, 100, grey(1));
-    const PreIntegrated1D method = build_pi1d(entries, 1, MeanOf::opacity_kye);
+    const RealPreIntegrated1D method = build_pi1d(entries, 1, MeanOf::opacity_kye);
     EXPECT_DOUBLE_EQ(method.slab(95, 105, 1).alpha, 0.1);  // a tent of area 1 over 10 entries
     EXPECT_DOUBLE_EQ(method.slab(100, 100, 1).alpha, 1);
 }
 
 TEST(PreIntegrated1D, EqualsThePointWhereNothingChanges) {
     const Entries entries = constant(256, 0.7, 0.5);
-    const PreIntegrated1D kye = build_pi1d(entries, 0.5, MeanOf::opacity_kye);
+    const RealPreIntegrated1D kye = build_pi1d(entries, 0.5, MeanOf::opacity_kye);
     // 256 roundings in the prefix over |ds| >= 1e-3.
     for (const Slab& slab : cases::slabs(256, 100, false, 13))
         EXPECT_LE(largest_difference(kye.slab(slab.front, slab.back, 0.5), point_slab(entries, 3, 0.5)),
