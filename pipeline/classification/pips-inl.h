@@ -82,9 +82,9 @@ template <class W>
 HWY_INLINE Slab<W> classify(const PowerSeriesOfOrder1& m, const PrefixSample<W>& front,
                             const PrefixSample<W>& back, W length) {
     const CutSlab<W> cut = cut_at_wall(m.prefix, front.input, back.input);
-    if (m.prefix.predicts && any(constant<W>(0) < cut.wall))
-        return classify(m, front, sample_of(m, cut.end_input), cut, length);
-    return classify(m, front, back, cut, length);
+    PrefixSample<W> end = back;
+    if (m.prefix.predicts && any(constant<W>(0) < cut.wall)) end = sample_of(m, cut.end_input);
+    return classify(m, front, end, cut, length);
 }
 template <class W>
 HWY_INLINE Slab<W> classify(const PowerSeriesOfOrder1& m, W front, W back, W length) {

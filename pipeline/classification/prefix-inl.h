@@ -22,10 +22,9 @@ namespace squint::HWY_NAMESPACE {
 /// denominator is shifted.
 template <class N>
 HWY_INLINE auto divide(const N& numerator, const N& denominator, const Rescale& to) {
-    if (to.shift <= 0) return quotient(numerator, denominator, to);
     Rescale whole = to;
-    whole.shift = 0;
-    return quotient(numerator, shift_left(denominator, to.shift), whole);
+    whole.shift = std::min(to.shift, 0);
+    return quotient(numerator, to.shift > 0 ? N(shift_left(denominator, to.shift)) : denominator, whole);
 }
 
 /// A prefix sum at a position, straight between rows and exact: `bits` more fraction bits than its words.

@@ -121,7 +121,11 @@ void projection_kernel(std::int64_t target, const Plan& plan, StageKernels& kern
 /// Calls f with the word for a way; `Known` is what a kernel is compiled to take for granted where it can.
 template <template <class, KnownRescales> class Lanes, KnownRescales Known, class F>
 void with_integer_word(const StageWay& way, F&& f) {
-    if (way.bits == 64)
+    // One lane alone is as fast in 64 bits: the portable target is compiled for them only.
+    constexpr bool kAlone = Lanes<std::int32_t, KnownRescales::nothing>::count() == 1;
+    if constexpr (kAlone)
+        f.template operator()<Lanes<std::int64_t, KnownRescales::nothing>>();
+    else if (way.bits == 64)
         f.template operator()<Lanes<std::int64_t, KnownRescales::nothing>>();
     else if (way.known >= Known)
         f.template operator()<Lanes<std::int32_t, Known>>();

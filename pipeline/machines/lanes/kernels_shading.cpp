@@ -5,9 +5,7 @@
 #define HWY_TARGET_INCLUDE "pipeline/machines/lanes/kernels_shading.cpp"
 #include <hwy/foreach_target.h>
 
-#include "fixedpoint/words/float_lanes-inl.h"
-#include "fixedpoint/words/lane_quotients-inl.h"
-#include "fixedpoint/words/lane_tables-inl.h"
+#include "fixedpoint/words/all_lanes-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/machines/lanes/plain.h"
 #include "pipeline/stages/gradient-inl.h"
@@ -91,6 +89,31 @@ HWY_INLINE std::array<L, 3> stored_gradient(const GradientStage& s, const lanes:
     return {along(0), along(1), along(2)};
 }
 
+/// The raw gradient of a slab: of its sample, or the sum of its two ends'.
+template <class W, bool kPlain>
+HWY_INLINE std::array<W, 3> slab_gradient(const GradientStage& stage, bool both_ends,
+                                          const lanes::LitSamples& lit, int at) {
+    std::array<W, 3> gradient = stored_gradient<W, kPlain>(stage, lit, 0, at);
+    if (both_ends) {
+        const std::array<W, 3> other = stored_gradient<W, kPlain>(stage, lit, 1, at);
+        for (std::size_t a = 0; a < 3; ++a) gradient[a] = gradient[a] + other[a];
+    }
+    return gradient;
+}
+
+/// Stage 3's first half, of the first `count` samples.  A function of its own, so that it is compiled once for
+/// whatever words normals have.
+template <class G, bool kPlain>
+HWY_NOINLINE void store_gradients(const Plan& plan, int count, lanes::LitSamples& lit) {
+    GradientStage stage = plan.gradient;
+    if constexpr (kPlain) take_as_plain(stage);
+    const bool both_ends = plan.gradients_a_slab() == 2;
+    for (int at = 0; at < count; at += static_cast<int>(G::count())) {
+        const std::array<G, 3> gradient = slab_gradient<G, kPlain>(stage, both_ends, lit, at);
+        for (std::size_t a = 0; a < 3; ++a) store(gradient[a], lit.gradient[a].v + at);
+    }
+}
+
 /// Stage 3: the raw gradient of slabs, of their samples or the sum of their two ends', and the normal.
 /// G: the lanes of the raw gradient, whose lerps may need wider ones than all that follows: it passes through
 /// 32-bit words, which hold whatever 32-bit lanes do.  Loops apart, for each vector's way through them is one
@@ -99,31 +122,19 @@ template <class G, class L, bool kPlain>
 void find_normals(const Plan& plan, int count, lanes::LitSamples& lit) {
     GradientStage stage = plan.gradient;
     if constexpr (kPlain) take_as_plain(stage);
-    const bool both_ends = plan.gradients_a_slab() == 2;
-    const auto slab_gradient = [&]<class W>(WordTag<W>, int at) SQUINT_WRITTEN_OUT {
-        std::array<W, 3> gradient = stored_gradient<W, kPlain>(stage, lit, 0, at);
-        if (both_ends) {
-            const std::array<W, 3> other = stored_gradient<W, kPlain>(stage, lit, 1, at);
-            for (std::size_t a = 0; a < 3; ++a) gradient[a] = gradient[a] + other[a];
-        }
-        return gradient;
-    };
     // 64-bit lanes' gradients need not fit 32-bit words.
     constexpr bool kStored = !std::is_same_v<L, Lanes<std::int64_t>>;
     if constexpr (kStored) {
         // To the end of the widest vector, which the loop behind reads whole.
         constexpr int kStep = static_cast<int>(std::max(G::count(), L::count()));
-        for (int at = 0; at < (count + kStep - 1) / kStep * kStep; at += static_cast<int>(G::count())) {
-            const std::array<G, 3> gradient = slab_gradient(WordTag<G>{}, at);
-            for (std::size_t a = 0; a < 3; ++a) store(gradient[a], lit.gradient[a].v + at);
-        }
+        store_gradients<G, kPlain>(plan, (count + kStep - 1) / kStep * kStep, lit);
     }
     for (int at = 0; at < count; at += static_cast<int>(L::count())) {
         std::array<L, 3> gradient;
         if constexpr (kStored)
             gradient = load_three<L>(lit.gradient, at);
         else
-            gradient = slab_gradient(WordTag<L>{}, at);
+            gradient = slab_gradient<L, kPlain>(stage, plan.gradients_a_slab() == 2, lit, at);
         const std::array<L, 3> normal = normalise(stage, gradient);
         for (std::size_t a = 0; a < 3; ++a) store(normal[a], lit.normal[a].v + at);
         if (stage.fades) store(confidence(stage, gradient), lit.confidence.v + at);
