@@ -1,5 +1,5 @@
 // Light inside a slab: where its gradients are taken (shading.inside), and how a slab in which the surface
-// turns is lit in pieces.  CONVENTIONS.md, "Light"; docs/papers/guetat.md.
+// turns is lit in pieces.  docs/conventions.md#light; docs/papers/guetat.md.
 //
 //     mean       the mean of the raw gradients at both ends
 //     front      the front end's

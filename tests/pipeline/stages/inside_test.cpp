@@ -1,4 +1,4 @@
-// Light inside a slab: its places, the angle that decides its pieces, and their light (docs/mathematics.md B7;
+// Light inside a slab: its places, the angle that decides its pieces, and their light (docs/math.md#b7;
 // the exact values are those of a slab of even matter, x = 1, between normals that turn from L by an angle).
 #include "pipeline/stages/inside-inl.h"
 
