@@ -43,7 +43,7 @@ SlabValue ExactSeries::in_pieces(double front, double back, double length, doubl
 }
 
 SlabValue ExactSeries::slab(double front, double back, double length) const {
-    const CutSlab cut = cut_at_opaque(entries, prediction, front, back, length);
+    const RealCutSlab cut = cut_at_opaque(entries, prediction, front, back, length);
     if (cut.wall && cut.length == 0) return {cut.wall_color, 1};
     if (cut.front == cut.back) return point_slab(entries, cut.front, cut.length);
     if (!legendre) return cut.over_wall(one_piece(cut.front, cut.back, cut.length));
