@@ -115,7 +115,7 @@ class Slabs {
 
     /// Slab k.  A ray's slabs come in order, backwards ones from the last: of neighbours that need both ends
     /// the sample between them is computed once.
-    HWY_INLINE void step(W k) {
+    void step(W k) {
         observer_.slab(k);
         take_samples(k);
         const W full = constant<W>(std::int64_t{1} << plan_.location.length_fraction);
@@ -123,10 +123,10 @@ class Slabs {
     }
 
     /// Whether slabs behind this one can be seen.
-    HWY_INLINE auto goes_on() const { return HWY_NAMESPACE::goes_on(plan_.compositing, pixel); }
+    auto goes_on() const { return HWY_NAMESPACE::goes_on(plan_.compositing, pixel); }
 
     /// Stages 1 and 2: sample k of the ray.
-    HWY_INLINE Sample<W> sample(W k) const {
+    Sample<W> sample(W k) const {
         observer_.at(Part::location);
         return sample_at({locate(plan_.location, ray_, k, 0), locate(plan_.location, ray_, k, 1),
                           locate(plan_.location, ray_, k, 2)});
@@ -136,7 +136,7 @@ class Slabs {
     void project(const ProjectedRay<W>& ray) { pixel = projected(plan_, method_, ray, pixel, observer_); }
 
   private:
-    HWY_INLINE void take_samples(W k) {
+    void take_samples(W k) {
         observer_.at(Part::location);
         if constexpr (!M::kNeedsBack) {
             front_ = sample(k);
@@ -149,10 +149,10 @@ class Slabs {
         }
         carries_ = true;
     }
-    HWY_INLINE Sample<W>& back() { return M::kNeedsBack ? back_ : front_; }
+    Sample<W>& back() { return M::kNeedsBack ? back_ : front_; }
 
     // Stages 4, 3 and 5, 6: one slab between two samples, or a part of one.
-    HWY_INLINE void composite_slab(Sample<W>& front, Sample<W>& back, W length) {
+    void composite_slab(Sample<W>& front, Sample<W>& back, W length) {
         observer_.at(Part::classification);
         Slab<W> slab = classify(method_, front.input, back.input, length);
         if (plan_.lit && any(constant<W>(0) < slab.alpha)) light(front, back, length, slab);
@@ -228,7 +228,7 @@ class Slabs {
     }
 
     // The raw gradient at an end, which two slabs share: computed once.
-    HWY_INLINE const std::array<W, 3>& gradient_of(Sample<W>& sample) const {
+    const std::array<W, 3>& gradient_of(Sample<W>& sample) const {
         if (!sample.has_gradient) sample.gradient = gradient_at(sample), sample.has_gradient = true;
         return sample.gradient;
     }
@@ -243,13 +243,13 @@ class Slabs {
     }
 
     // Stage 2 at a location.
-    HWY_INLINE Sample<W> sample_at(const std::array<W, 3>& location) const {
+    Sample<W> sample_at(const std::array<W, 3>& location) const {
         Sample<W> sample = scalar_at(location);
         observer_.at(Part::input);
         sample.input = classification_input(plan_.input, sample.scalar);
         return sample;
     }
-    HWY_INLINE Sample<W> scalar_at(const std::array<W, 3>& location) const {
+    Sample<W> scalar_at(const std::array<W, 3>& location) const {
         Sample<W> sample;
         sample.location = location;
         sample.position = position_of(location);
@@ -259,7 +259,7 @@ class Slabs {
         return sample;
     }
 
-    HWY_INLINE CellPosition<W> position_of(const std::array<W, 3>& location) const {
+    CellPosition<W> position_of(const std::array<W, 3>& location) const {
         CellPosition<W> position = cell_position(plan_.location, location);
         // A part of a cell: what its meaning says and intervals do not see.
         for (W& w : position.weight) w = within(w, 0, std::int64_t{1} << plan_.interpolation.weight_bits);
@@ -267,7 +267,7 @@ class Slabs {
     }
 
     // Stage 3 at a sample: the raw gradient, per smallest voxel spacing.
-    HWY_INLINE std::array<W, 3> gradient_at(const Sample<W>& sample) const {
+    std::array<W, 3> gradient_at(const Sample<W>& sample) const {
         const GradientStage& s = plan_.gradient;
         std::array<W, 3> gradient;
         Neighbourhood<W> near;
@@ -288,7 +288,7 @@ class Slabs {
         }
         return gradient;
     }
-    HWY_INLINE W scalar_beside(const Sample<W>& sample, int axis, bool ahead) const {
+    W scalar_beside(const Sample<W>& sample, int axis, bool ahead) const {
         observer_.at(Part::location);
         std::array<W, 3> location = sample.location;
         const auto a = static_cast<std::size_t>(axis);
