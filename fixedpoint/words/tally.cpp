@@ -104,17 +104,18 @@ Tally floor_shift(const Tally& x, int bits) {
 }
 Tally min(const Tally& a, const Tally& b) {
     const Range proven = min(a.proven, b.proven);
-    if (!a.is_constant && !b.is_constant) return {proven, most_spare(a, b), false};
+    if (!a.is_constant && !b.is_constant) return with_width(proven, std::max(a.width(), b.width()));
     return with_width(proven, std::min(a.width(), b.width()), both_constant(a, b));
 }
 Tally max(const Tally& a, const Tally& b) {
-    return {max(a.proven, b.proven), most_spare(a, b), both_constant(a, b)};
+    return with_width(max(a.proven, b.proven), std::max(a.width(), b.width()), both_constant(a, b));
 }
 Tally absolute(const Tally& x) {
     return {absolute(x.proven), x.spare, x.is_constant};
 }
 Tally select(Perhaps, const Tally& yes, const Tally& no) {
-    return {select(Perhaps{}, yes.proven, no.proven), most_spare(yes, no), false};
+    // As wide as the wider of the two: spare bits are spare of each one's own range.
+    return with_width(select(Perhaps{}, yes.proven, no.proven), std::max(yes.width(), no.width()));
 }
 Tally gather(const Table& table, const Tally& row, int column) {
     return looked_up(gather(table, row.proven, column), table.wire_of(column));

@@ -327,7 +327,7 @@ class Reader {
     }
     int bits(const TomlValue& v, WireEdit::Part part) const {
         const bool offset = part == WireEdit::Part::fraction_offset || part == WireEdit::Part::integer_offset;
-        return static_cast<int>(whole(v, offset ? -24 : 0, 24));
+        return static_cast<int>(whole(v, offset ? -kMostFractionBits : 0, kMostFractionBits));
     }
     std::string rule(const TomlValue& v, WireEdit::Part part) const {
         Rounding r{};

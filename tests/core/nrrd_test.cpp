@@ -467,6 +467,7 @@ TEST_F(Nrrd, ALeftHandedSpaceIsNoted) {
 TEST_F(Nrrd, RefusesWhatIsNoNrrd) {
     EXPECT_THAT(refusal_of((folder / "none.nrrd").string()),
                 HasSubstr("none.nrrd: cannot read: No such file or directory"));
+    setenv("SQUINT_READ", (std::filesystem::path(SQUINT_PROGRAM).parent_path() / "squint-read").c_str(), 1);
     EXPECT_EQ(refusal_of(folder.string()),
               folder.string() + ": a folder without DICOM, TIFF or PNG slices; allowed: one of their series");
     EXPECT_EQ(refusal_of(file("a.nrrd", "P5 2 2")), "a.nrrd: no NRRD: the file does not begin with \"NRRD\"");

@@ -40,7 +40,7 @@ TEST(Format, TheSignBitIsExtra) {
 TEST(Format, WhatIsNoFormatIsRefusedInOneLineAndChangesNothing) {
     const Format before{3, 4, true};
     for (const char* text : {"",      "u",      "u1",     "u1.",   "u.15",   "1.15",   "u1.15b",
-                             "q1.15", "u25.0",  "u0.25",  "u0.0",  "s0.0",   "u1.150", "u-1.15",
+                             "q1.15", "u25.0",  "u0.30",  "u0.0",  "s0.0",   "u1.150", "u-1.15",
                              "u1,15", " u1.15", "u1.15 ", "U1.15", "u1.1.5", "u100.1", "u1 .15"}) {
         Format format = before;
         const std::string wrong = parse_format(text, format);

@@ -237,6 +237,9 @@ TEST(Cost, CountsWhatAnIndependentWordCountsForEveryMethodAndModel) {
         for (const auto& variant : kVariants) {
             std::vector<std::string> settings = method;
             settings.insert(settings.end(), variant.begin(), variant.end());
+            // Slab methods do not take a field with jumps.
+            if (text_of(variant, {}).find("nearest") != std::string::npos && method != kMethods.front())
+                continue;
             const Plan plan = plan_with(settings);
             LastSlab every;
             counted = {};
@@ -257,14 +260,15 @@ TEST(Cost, CountsWhatAnIndependentWordCountsForEveryMethodAndModel) {
 }
 
 // One slab of the built-in scene, a full step long, on the path that it takes: what a reviewer counted by a
-// word of their own (docs/sweeps.md).
+// word of their own (docs/sweeps.md).  Since then sums of pi1d bend between entries wherever that shows over a ray,
+// as T does: 16 products and 8 look-ups more.
 TEST(Cost, OneSlabOfEveryMethodTakesTheOperationsThatWereCountedBeforehand) {
     struct Row {
         std::vector<std::string> settings;
         std::int64_t products, quotients, lookups;
     };
     const std::vector<Row> rows{{{"classification.method=pc"}, 4, 0, 8},
-                                {{"classification.method=pi1d"}, 8, 4, 16},
+                                {{"classification.method=pi1d"}, 24, 4, 24},
                                 {{"classification.method=pips"}, 13, 4, 20},
                                 {{"classification.method=pips", "classification.order=3"}, 66, 27, 41},
                                 {{"classification.method=pips", "classification.order=5"}, 140, 54, 57},

@@ -397,18 +397,24 @@ void expect_half_an_lsb8(const std::string& name, Scene scene, int size, bool sa
         scene.classification.method = method.method, scene.classification.order = method.order;
         Image pictures[2];
         double left_out = 0;
+        bool clamps = false;
         try {
             for (const int real : {0, 1}) {
                 scene.precision.preset = real ? "real" : "wide";
                 Plan plan = make_plan(scene, volume);
                 if (real && same_places) set_active(plan, kPlaces);
                 if (!real) left_out = left_out_by_words(plan);
+                for (const Entry& entry : plan.entries.entry)
+                    clamps = clamps || entry.extinction * plan.step_world > 1;
                 pictures[real] = render(plan).image;
             }
         } catch (const InputError&) {
             EXPECT_EQ(name, "million") << method.name;
             continue;
         }
+        // Engel's clamp holds between two different ends only (docs/classification.md): where an entry is deeper
+        // than 1 the method jumps at a span of nothing, which words reach and doubles do not.
+        if (method.method == Method::pi1d_engel && clamps) continue;
         const double worst = largest_difference_lsb8(pictures[0], pictures[1]);
         EXPECT_LE(worst, 0.5 + left_out) << name << ' ' << method.name;
         most = std::max(most, worst);
