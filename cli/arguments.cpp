@@ -89,25 +89,37 @@ E named(const std::string_view (&names)[n], const std::string& name) {
     return static_cast<E>(std::find(names, names + n, name) - names);
 }
 
+void add_series(CLI::App& verb, std::vector<std::string>& overrides) {
+    verb.add_option_function<std::string>(
+            "--series", [&](const std::string& text) { overrides.push_back("volume.series=" + text); },
+            "Of a DICOM folder with several series: which, counted from 1")
+        ->trigger_on_parse()
+        ->type_name("N");
+}
+
 void add_scene(CLI::App& verb, SceneArguments& scene) {
-    verb.add_option(
-            "scene", scene.file,
-            "Scene file (TOML), or @NAME of one that comes with squint; the built-in scene when left out")
-        ->type_name("SCENE.toml");
+    verb.add_option("scene", scene.file,
+                    "Scene file (TOML), @NAME of one that comes with squint, or a volume or folder of "
+                    "slices, which makes "
+                    "a scene of its own; the built-in scene when left out")
+        ->type_name("SCENE.toml|VOLUME");
+    add_series(verb, scene.overrides);
     add_set(verb, scene.overrides, "Set any key of the scene; may be repeated, the last wins");
     add_size(verb, scene.overrides);
 }
 
 void add_render(CLI::App& app, RenderArguments& a) {
-    CLI::App& verb = add_verb(app, "Pictures", "render", "Render a scene to EXR");
+    CLI::App& verb = add_verb(app, "Pictures", "render", "Render a scene or a volume to EXR, PNG or JPEG");
     add_scene(verb, a.scene);
-    verb.add_option(
-            "-o,--output", a.output,
-            "EXR to write; when left out and nothing else is asked for, the scene's name with .exr; a "
-            "turntable writes OUT.0000.exr and so on")
-        ->type_name("OUT.exr");
-    verb.add_option("--preview", a.preview, "PNG to write: over the background, encoded as sRGB")
-        ->type_name("OUT.png");
+    verb.add_option("-o,--output", a.output,
+                    "EXR to write, or PNG or JPEG as --preview does; when left out and nothing else is asked "
+                    "for, the scene's "
+                    "name with .exr; a turntable writes OUT.0000.exr and so on")
+        ->type_name("OUT.exr|png|jpg");
+    verb.add_option("--preview", a.preview, "PNG or JPEG to write: over the background, encoded as sRGB")
+        ->type_name("OUT.png|jpg");
+    verb.add_flag("--print-scene", a.print_scene,
+                  "Print the scene as TOML, with what was chosen from the data, and stop");
     verb.add_option(
             "--json", a.json,
             "Write a record of the picture (schema squint.render/2): time, samples, path, memory, hash")
@@ -155,6 +167,7 @@ void add_render(CLI::App& app, RenderArguments& a) {
                   "Print docs/scene.md, every key of a scene, and stop");
     verb.footer(
         "Examples:\n"
+        "  squint render scan.nii.gz -o scan.png\n"
         "  squint render -o head.exr --preview head.png --error\n"
         "  squint render head.toml --set precision.preset=squeeze --set sampling.step=0.5 -o squeeze.exr\n"
         "  squint render head.toml --set 'precision.transparency=u1.8 trn' --audit --json -");
@@ -276,8 +289,9 @@ void add_compare(CLI::App& app, CompareArguments& a) {
 void add_info(CLI::App& app, InfoArguments& a) {
     CLI::App& verb =
         add_verb(app, "Volumes", "info", "Describe a volume: size, type, spacing, range, histogram");
-    verb.add_option("volume", a.volume, "NRRD or raw file, or a procedural volume by name")
+    verb.add_option("volume", a.volume, "Volume file, folder of slices, or a procedural volume by name")
         ->type_name("VOLUME");
+    add_series(verb, a.overrides);
     add_set(verb, a.overrides, "Set a volume.* key: what a raw file does not say");
     add_json_flag(verb, a.json);
     verb.footer(
@@ -288,10 +302,11 @@ void add_info(CLI::App& app, InfoArguments& a) {
 }
 
 void add_volume(CLI::App& app, VolumeArguments& a) {
-    CLI::App& verb = add_verb(app, "Volumes", "volume", "Write a procedural or raw volume as NRRD");
-    verb.add_option("volume", a.volume, "A procedural volume by name, or a NRRD or raw file")
+    CLI::App& verb = add_verb(app, "Volumes", "volume", "Write a volume of any kind as NRRD");
+    verb.add_option("volume", a.volume, "A procedural volume by name, a volume file or a folder of slices")
         ->required()
         ->type_name("NAME|FILE");
+    add_series(verb, a.overrides);
     verb.add_option("-o,--output", a.output, "NRRD to write")->required()->type_name("OUT.nrrd");
     add_set(verb, a.overrides, "Set a volume.* key");
     verb.add_option_function<std::string>(

@@ -3,8 +3,10 @@
 #include "cli/shelf.h"
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/import/kind.h"
 #include "core/procedural.h"
 #include "core/volume_source.h"
+#include "scene/from_data.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -33,8 +35,13 @@ void write_json(const std::string& path, const nlohmann::ordered_json& json) {
 }
 
 Scene read(const SceneArguments& arguments) {
-    Scene scene = arguments.file.empty() ? scene_with(built_in_scene(), arguments.overrides)
-                                         : read_scene(file_of(arguments.file), arguments.overrides);
+    const auto sets_file = [](const std::string& text) { return text.starts_with("volume.file"); };
+    const bool of_data = arguments.file.empty()
+                             ? std::any_of(arguments.overrides.begin(), arguments.overrides.end(), sets_file)
+                             : !arguments.file.starts_with('@') && looks_like_volume(arguments.file);
+    Scene scene = of_data                  ? scene_with(scene_of_data(arguments.file), arguments.overrides)
+                  : arguments.file.empty() ? scene_with(built_in_scene(), arguments.overrides)
+                                           : read_scene(file_of(arguments.file), arguments.overrides);
     scene.precision = resolved_precision(scene);
     return scene;
 }
@@ -56,6 +63,13 @@ std::shared_ptr<const Volume> load(const Scene& scene, std::vector<std::string>&
     LoadLimits limits;
     if (max_bytes > 0) limits.max_bytes = std::min(limits.max_bytes, max_bytes);
     return std::make_shared<const Volume>(load_volume(volume_source(scene), limits, &notes));
+}
+
+std::shared_ptr<const Volume> load_and_complete(Scene& scene, std::vector<std::string>& notes,
+                                                std::int64_t max_bytes) {
+    auto volume = load(scene, notes, max_bytes);
+    complete_from_data(scene, *volume, notes);
+    return volume;
 }
 
 namespace {
@@ -86,9 +100,9 @@ Plan plan_of(const Scene& scene, std::shared_ptr<const Volume> volume, int frame
 }
 
 Plan plan_of(const SceneArguments& arguments) {
-    const Scene scene = read(arguments);
+    Scene scene = read(arguments);
     std::vector<std::string> notes;
-    const auto volume = load(scene, notes);
+    const auto volume = load_and_complete(scene, notes);
     Plan plan = plan_of(scene, volume);
     plan.notes.insert(plan.notes.begin(), notes.begin(), notes.end());
     return plan;

@@ -24,11 +24,17 @@ void print_json(const nlohmann::ordered_json& json);
 /// To a file, whole or not at all, or - for standard output.
 void write_json(const std::string& path, const nlohmann::ordered_json& json);
 
-/// The scene asked for, its preset file merged in: what is planned, rendered and recorded.
+/// The scene asked for, its preset file merged in.  A volume where a scene is expected, or one set in place of the
+/// built-in head, makes a scene of its own; its transfer function may still be missing: load() brings it.
 Scene read(const SceneArguments& arguments);
 
 /// A scene whose volume is NAME (procedural) or a file, with `volume.*` overrides.
 Scene scene_of_volume(const std::string& name_or_file, const std::vector<std::string>& overrides);
+
+/// The scene's volume, refused beyond `max_bytes` (0: no limit), as load(); a scene without a transfer function gets
+/// the data's own.
+std::shared_ptr<const Volume> load_and_complete(Scene& scene, std::vector<std::string>& notes,
+                                                std::int64_t max_bytes = 0);
 
 /// The scene's volume, refused beyond `max_bytes` (0: no limit).  `notes` gets what a user should know.
 std::shared_ptr<const Volume> load(const Scene& scene, std::vector<std::string>& notes,

@@ -60,6 +60,7 @@ std::string info_text(const Volume& v) {
          fmt::format("{}, levels of {} bits", v.type == ScalarType::u8 ? "u8" : "u16", v.scalar_bits));
     line("spacing", fmt::format("{:g} {:g} {:g}", v.spacing.x, v.spacing.y, v.spacing.z));
     line("origin", fmt::format("{:g} {:g} {:g}", v.origin.x, v.origin.y, v.origin.z));
+    if (!v.space.empty()) line("axes", v.space + (v.modality.empty() ? "" : ", " + v.modality));
     line("scalars", fmt::format("{} to {}", v.smallest, v.largest));
     line("values", fmt::format("{:g} to {:g} (value = {:g} * scalar + {:g})",
                                v.value_scale * v.smallest + v.value_offset,
@@ -82,6 +83,8 @@ int run(const InfoArguments& a) {
     nlohmann::ordered_json json = json_of(*volume);
     const Histogram h = histogram_of(*volume, 256);
     json["histogram"] = {{"first_scalar", h.first}, {"scalars_per_bin", h.width}, {"counts", h.count}};
+    if (!volume->space.empty()) json["space"] = volume->space;
+    if (!volume->modality.empty()) json["modality"] = volume->modality;
     json["notes"] = notes;
     print_json(json);
     return kDone;

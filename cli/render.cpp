@@ -2,11 +2,13 @@
 #include "cli/common.h"
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/preview.h"
 #include "core/text.h"
 #include "pipeline/record.h"
 #include "truth/reference.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 #include <nlohmann/json.hpp>
 
@@ -18,6 +20,9 @@
 #include <cstring>
 #include <filesystem>
 #include <mutex>
+#include <span>
+#include <string_view>
+#include <utility>
 
 namespace squint::cli {
 namespace {
@@ -54,13 +59,24 @@ std::string frame_path(const std::string& path, int frame, int frames) {
     return numbered.string();
 }
 
+using Extensions = std::span<const std::string_view>;
+constexpr std::string_view kExr[] = {".exr"}, kPreviews[] = {".png", ".jpg", ".jpeg"},
+                           kPictures[] = {".exr", ".png", ".jpg", ".jpeg"};
+
+bool ends_in(const std::string& path, Extensions extensions) {
+    const std::string extension = std::filesystem::path(path).extension().string();
+    return std::find(extensions.begin(), extensions.end(), extension) != extensions.end();
+}
+
 /// Refuses at once what would be refused after the work.
-void check_output(const std::string& path, const char* flag, const char* extension) {
+void check_output(const std::string& path, const char* flag, Extensions extensions) {
     if (path.empty()) return;
     const std::filesystem::path file(path);
     std::error_code ignored;
-    if (extension && file.extension() != extension && !std::filesystem::is_character_file(file, ignored))
-        throw InputError(fmt::format("{} {}: the name must end in {}", flag, path, extension));
+    if (extensions.size() > 0 && !ends_in(path, extensions) &&
+        !std::filesystem::is_character_file(file, ignored))
+        throw InputError(
+            fmt::format("{} {}: the name must end in {}", flag, path, fmt::join(extensions, ", ")));
     const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
     if (!std::filesystem::is_directory(folder, ignored))
         throw InputError(fmt::format("{}: cannot write: there is no folder {}", path, folder.string()));
@@ -142,7 +158,7 @@ struct Job {
     const RenderArguments& arguments;
     Scene scene;
     std::shared_ptr<const Volume> volume;
-    std::string output;  // as asked for, or the default
+    std::string output, preview;  // EXR as asked for, or the default; PNG or JPEG
 };
 
 /// The exact integral, with the scene in its attributes but no formats: it has none.
@@ -204,12 +220,13 @@ Json render_frame(const Job& job, int frame) {
         }
     }
     const int frames = job.scene.camera.turntable;
-    const std::string exr = frame_path(job.output, frame, frames), png = frame_path(a.preview, frame, frames);
+    const std::string exr = frame_path(job.output, frame, frames),
+                      png = frame_path(job.preview, frame, frames);
     if (!exr.empty()) write_exr(rendering.image, exr, exr_attributes(plan, frame));
     if (!png.empty()) {
         const Vec3& b = job.scene.image.background;
         const double background[3] = {b.x, b.y, b.z};
-        write_preview_png(rendering.image, png, background);
+        write_preview(rendering.image, png, background);
     }
     const bool measured = a.error || a.reference;
     const std::vector<std::string> warnings = warnings_of(plan, rendering);
@@ -236,6 +253,17 @@ Json render_frame(const Job& job, int frame) {
     return record;
 }
 
+/// The line that makes a film of a turntable's pictures.
+std::string film_line(const Job& job) {
+    const bool linear = job.preview.empty();
+    std::filesystem::path frames(linear ? job.output : job.preview), film = frames;
+    const std::string extension = frames.extension().string();
+    frames.replace_extension(".%04d" + extension);
+    film.replace_extension(".mp4");
+    return fmt::format("film: ffmpeg -framerate 25 {}-i '{}' -pix_fmt yuv420p '{}'\n",
+                       linear ? "-apply_trc iec61966_2_1 " : "", frames.string(), film.string());
+}
+
 std::string default_output(const RenderArguments& a) {
     if (!a.preview.empty() || !a.json.empty() || a.options.audit) return {};
     return a.scene.file.empty() ? "squint.exr" : std::filesystem::path(a.scene.file).stem().string() + ".exr";
@@ -245,13 +273,24 @@ std::string default_output(const RenderArguments& a) {
 
 int run(const RenderArguments& a) {
     if (a.scene_reference) return print(scene_reference_markdown()), kDone;
-    const std::string output = a.output.empty() ? default_output(a) : a.output;
-    check_output(output, "-o", ".exr");
-    check_output(a.preview, "--preview", ".png");
-    check_output(a.reference_output, "--reference-output", ".exr");
-    if (a.json != "-") check_output(a.json, "--json", nullptr);
+    std::string output = a.output.empty() ? default_output(a) : a.output, preview = a.preview;
+    check_output(output, "-o", kPictures);
+    check_output(preview, "--preview", kPreviews);
+    check_output(a.reference_output, "--reference-output", kExr);
+    if (a.json != "-") check_output(a.json, "--json", {});
+    if (ends_in(output, kPreviews)) {
+        if (!preview.empty())
+            throw InputError(
+                fmt::format("-o {}: a second preview beside --preview {}; allowed: .exr", output, preview));
+        preview = std::exchange(output, "");
+    }
 
-    const Scene scene = read(a.scene);
+    Scene scene = read(a.scene);
+    if (a.print_scene) {
+        std::vector<std::string> unread;
+        load_and_complete(scene, unread, a.max_memory);
+        return print(to_toml(scene)), kDone;
+    }
     if (a.options.audit && rounds_nothing(scene.precision.preset))
         throw InputError(fmt::format(
             "--audit: precision.preset is \"{}\", which rounds no wire; allowed: any other preset",
@@ -259,13 +298,16 @@ int run(const RenderArguments& a) {
     refuse_beyond(a.max_memory, image_bytes(scene),
                   fmt::format("a picture of {}x{} pixels", scene.image.width, scene.image.height));
     std::vector<std::string> notes;
-    const Job job{a, scene, load(scene, notes, a.max_memory), output};
+    const auto volume = load_and_complete(scene, notes, a.max_memory);
+    const Job job{a, scene, volume, output, preview};
     if (!a.quiet)
         for (const std::string& note : notes)
             std::fputs(fmt::format("  note: {}\n", message_text(note)).c_str(), stderr);
 
     Json pictures = Json::array();
     for (int frame = 0; frame < scene.camera.turntable; ++frame) pictures.push_back(render_frame(job, frame));
+    if (scene.camera.turntable > 1 && !a.quiet && !(output.empty() && preview.empty()))
+        std::fputs(film_line(job).c_str(), stderr);
     if (a.json.empty()) return kDone;
     Json record{{"schema", "squint.render/2"},
                 {"version", version()},

@@ -4,6 +4,7 @@
 #include "core/error.h"
 #include "core/exr_header.h"
 #include "core/pictures/pictures.h"
+#include "core/preview.h"
 #include "core/srgb.h"
 #include "core/volume_data.h"
 
@@ -149,17 +150,32 @@ Image preview_of(const Image& image, const double background[3]) {
     return shown;
 }
 
-void write_preview_png(const Image& image, const std::string& path, const double background[3], int level) {
+namespace {
+/// In a format of OpenImageIO's, with a setting of its encoder.
+void write_8bit(const char* format, const std::pair<std::string, int>& setting, const Image& image,
+                const std::string& path, const double background[3]) {
     const std::vector<std::uint8_t> packed = preview_codes(image, path, background);
     constexpr auto kByte = pictures::Packed::Type::u8;
-    write({"png",
+    write({format,
            image.width,
            image.height,
            {{"R", kByte}, {"G", kByte}, {"B", kByte}},
            packed.data(),
            {{"oiio:ColorSpace", "sRGB"}},
-           {{"png:compressionLevel", level}}},
+           {setting}},
           path);
+}
+}  // namespace
+
+void write_preview_png(const Image& image, const std::string& path, const double background[3], int level) {
+    write_8bit("png", {"png:compressionLevel", level}, image, path, background);
+}
+
+void write_preview(const Image& image, const std::string& path, const double background[3]) {
+    constexpr int kQuality = 95;
+    if (path.ends_with(".jpg") || path.ends_with(".jpeg"))
+        return write_8bit("jpeg", {"CompressionQuality", kQuality}, image, path, background);
+    write_preview_png(image, path, background);
 }
 
 Image read_image(const std::string& path, Attributes* attributes) {

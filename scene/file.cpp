@@ -349,6 +349,7 @@ void check_transfer_function(const Scene& scene) {
         if (const std::string key = fmt::format("transfer_function.{}", list);
             given.empty() && scene.given_at.contains(key))
             refuse(scene, key, "an empty list", kOne);
+    if (given.empty() && !scene.volume.file.empty()) return;  // the data bring their own (scene/from_data.h)
     if (given.empty()) refuse(scene, "transfer_function", "none", kOne);
     if (tf.color.empty() != tf.opacity.empty())
         refuse(scene, tf.color.empty() ? "transfer_function.opacity" : "transfer_function.color",

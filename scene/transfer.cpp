@@ -2,6 +2,7 @@
 #include "core/error.h"
 #include "core/srgb.h"
 #include "core/transfer_import.h"
+#include "scene/from_data.h"
 #include "scene/scene.h"
 #include "scene/toml.h"
 
@@ -105,6 +106,10 @@ TransferFunction resolve_transfer_function(const Scene& scene, const Volume& vol
     const auto& settings = scene.transfer_function;
     std::string_view key = "transfer_function.points";
     TransferFunction function;
+    if (!has_transfer_function(scene))
+        throw InputError(
+            fmt::format("{}: found none; allowed: exactly one of points, color with opacity, preset, file",
+                        where(scene, "transfer_function")));
     if (!settings.preset.empty())
         key = "transfer_function.preset", function = from_preset(scene);
     else if (!settings.file.empty())

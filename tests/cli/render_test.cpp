@@ -222,7 +222,7 @@ TEST_F(Render, WhatOnlySeveralSettingsShowIsRefusedWhereOneOfThemStands) {
 TEST_F(Render, OutputsThatCannotBeAreRefusedBeforeTheWork) {
     const std::string slow = "render --size 4000x4000 --set sampling.step=0.01 ";
     expect_refusal(squint(slow + "-o no/such/a.exr"), "no folder no/such");
-    expect_refusal(squint(slow + "-o a.png"), ".exr");
+    expect_refusal(squint(slow + "-o a.gif"), ".exr");
     expect_refusal(squint(slow + "--preview a.exr"), ".png");
     fs::create_directory(folder / "locked");
     fs::permissions(folder / "locked", fs::perms::owner_read | fs::perms::owner_exec);
