@@ -54,7 +54,7 @@ TEST_F(OwnFile, TheBuiltInFunctionDoesNotFallOnOtherData) {
 }
 
 TEST_F(OwnFile, CtIsRecognisedByItsAirAndItsTissue) {
-    const std::string ct = "scan.nrrd --set volume.scale=1 --set volume.value_offset=-1000 ";
+    const std::string ct = "scan.nrrd --set volume.scale=1 --set volume.value_offset=-1250 ";
     const Outcome outcome = squint("render " + ct + " --print-scene");
     EXPECT_NE(outcome.out.find("preset = \"ct_skin_and_bone\""), std::string::npos) << outcome.out;
 }
