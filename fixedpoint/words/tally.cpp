@@ -104,11 +104,11 @@ Tally floor_shift(const Tally& x, int bits) {
 }
 Tally min(const Tally& a, const Tally& b) {
     const Range proven = min(a.proven, b.proven);
-    if (!a.is_constant && !b.is_constant) return with_width(proven, std::max(a.width(), b.width()));
+    if (!a.is_constant && !b.is_constant) return {proven, most_spare(a, b), false};
     return with_width(proven, std::min(a.width(), b.width()), both_constant(a, b));
 }
 Tally max(const Tally& a, const Tally& b) {
-    return with_width(max(a.proven, b.proven), std::max(a.width(), b.width()), both_constant(a, b));
+    return {max(a.proven, b.proven), most_spare(a, b), both_constant(a, b)};
 }
 Tally absolute(const Tally& x) {
     return {absolute(x.proven), x.spare, x.is_constant};

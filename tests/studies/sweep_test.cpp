@@ -108,7 +108,7 @@ TEST(SweepFile, SaysInOneLineWhatIsWrongAndWhere) {
     EXPECT_THAT(refusal("[base]\nsampling.stpe = 1\n"), HasSubstr("s.toml:2:"));
     EXPECT_THAT(refusal("[[axis]]\nwires = ['colour']\nfraction_bits = [8]\n"),
                 HasSubstr("did you mean \"color\"?"));
-    EXPECT_THAT(refusal("[[axis]]\nwires = ['color']\nfraction_bits = [25]\n"),
+    EXPECT_THAT(refusal("[[axis]]\nwires = ['color']\nfraction_bits = [30]\n"),
                 HasSubstr("allowed: a whole number from 0 to 29"));
     EXPECT_THAT(refusal("[[axis]]\nkey = 'sampling.step'\nvalues = []\n"), HasSubstr("at least one value"));
     EXPECT_THAT(refusal("[[axis]]\nkey = 'sampling.step'\nrange = { from = 1, to = 2, step = -1 }\n"),
