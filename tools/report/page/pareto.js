@@ -25,7 +25,7 @@ function pareto(place, cost, title, without) {
     tip: { point: p.label, [kFigures[state.figure]]: number(error), [title]: number(cost), path: p.path } }));
   values.sort((u, v) => u.kept - v.kept || u.front - v.front); // what matters is drawn last
   const costs = values.map((v) => v.cost), least = Math.min(...costs), most = Math.max(...costs);
-  const x = { field: 'cost', type: 'quantitative', title, scale: least > 0 && most > 30 * least ? { type: 'log', nice: false, padding: 10 } : { zero: false, nice: false, padding: 10 }, axis: { tickCount: 6, format: '~s', labelOverlap: true } };
+  const x = { field: 'cost', type: 'quantitative', title, scale: least > 0 && most > 30 * least ? { type: 'log', nice: false, padding: 10 } : { zero: false, nice: false, padding: 10 }, axis: { tickCount: 6, format: '~s', labelOverlap: true, labelBound: true } };
   const y = { field: 'shown', ...errorAxis() };
   chart(place, `${kFigures[state.figure]} against ${title}, ${values.length} points`, {
     height: 290, data: { values },
