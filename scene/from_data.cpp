@@ -117,7 +117,7 @@ Scene scene_of_data(const std::string& file) {
     scene.volume.procedural.clear();
     scene.volume.file = file;
     scene.lights = {{.headlight = true}};
-    scene.shading.ka = 0.3, scene.shading.kd = 0.7, scene.shading.ks = 0.2;
+    scene.shading.ka = 0.25, scene.shading.kd = 0.6, scene.shading.ks = 0.15;
     scene.classification.method = Method::pips;
     return scene;
 }
