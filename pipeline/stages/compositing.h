@@ -2,7 +2,7 @@
 //
 //     w               w = q(alpha T);  T -= w;  C += c w       the default: C + T = 1 for white, one multiply fewer
 //     w_carry         w = floor((alpha T + r) / 2^F), r the remainder, carried to the next slab;  T -= w;  C += c w,
-//                     exact: ours, docs/compositing.md.  What rounding costs A does not grow with the slabs
+//                     in 29 bits: ours, docs/compositing.md.  What rounding costs A does not grow with the slabs
 //     equation_9      C += C_s T;  T = q(T (1 - alpha))        Squeeze, equation 9
 //     alpha           C += C_s (1 - A);  A += q((1 - A) alpha) front to back with opacity
 //     back_to_front   C = C_s + q(C (1 - alpha))               Squeeze, equation 6
