@@ -11,7 +11,7 @@
 #include "pipeline/classification/methods.h"
 #include "pipeline/classification/tables/pi2d_table.h"
 #include "pipeline/classification/tables/prefix_tables.h"
-#include "scene/presets.h"
+#include "pipeline/stages/presets.h"
 
 namespace {
 

@@ -5,6 +5,7 @@
 #include "core/preview.h"
 #include "core/text.h"
 #include "pipeline/record.h"
+#include "scene/presets.h"
 #include "truth/reference.h"
 
 #include <fmt/format.h>

@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "core/portable_math.h"
 #include "pipeline/stages/inputs.h"
+#include "pipeline/stages/presets.h"
 
 #include <fmt/format.h>
 
@@ -27,6 +28,38 @@ double decoded_alpha(double alpha, const Spec& spec, AlphaEncoding encoding) {
 }
 
 }  // namespace
+
+std::vector<WireFormats> classification_wires(const PresetInputs& in) {
+    constexpr Rounding trn = Rounding::trn;
+    const int sum = accumulating_bits(in), wide_sum = wide_accumulating_bits(in), total = in.total_depth_bits;
+    // One entry's depth times an input's 8 fraction bits fits 32, too, where the sums' 15 bits do.
+    const int depth = sum > 15 ? sum + 1 : std::min(20, 23 - in.depth_bits);
+    // A full step's depth, before a shorter slab takes its part of it: all of it must fit.  Deep steps take
+    // their integer bits from two spare fraction bits first, which 32-bit lanes multiply as before.
+    const int deep = std::max(4, in.depth_bits);
+    const auto sums = [&](Wire wire) -> WireFormats {
+        return {wire, unsigned_spec(total, std::min(depth, held(31 - total)), kToEven),
+                unsigned_spec(std::max(9, total), 15, trn), unsigned_spec(std::max(9, total), 15, trn),
+                unsigned_spec(total, 24, kToEven)};
+    };
+    const Spec squeeze = unsigned_spec(1, 15, trn), byte = unsigned_spec(0, 8, trn),
+               eight_bit = unsigned_spec(1, 8, trn), wide = unsigned_spec(1, wide_sum, kToEven);
+    return {
+        {Wire::classification_input, unsigned_spec(in.entry_bits, held(8 + in.entry_levels_bits), kHalvesUp),
+         unsigned_spec(12, 0, trn), unsigned_spec(in.entry_bits, 0, trn),
+         unsigned_spec(in.entry_bits, held(std::min(18 + in.entry_levels_bits, 31 - in.entry_bits)),
+                       kToEven)},
+        {Wire::table_color, unsigned_spec(1, 15, kToEven), squeeze, byte, wide},
+        {Wire::table_alpha, unsigned_spec(1, sum, kToEven), squeeze, byte, wide},
+        sums(Wire::table_extinction),
+        sums(Wire::table_moment),
+        {Wire::slab_depth, unsigned_spec(deep, held(std::max(sum + 7 - deep, sum + 1)), kHalvesUp),
+         unsigned_spec(4, 15, trn), unsigned_spec(4, 8, trn),
+         unsigned_spec(std::max(5, in.depth_bits), 24, kToEven)},
+        {Wire::slab_ratio, unsigned_spec(1, 15, kHalvesUp), squeeze, eight_bit, wide},
+        {Wire::slab_alpha, unsigned_spec(1, sum, kHalvesUp), squeeze, eight_bit, wide},
+        {Wire::slab_color, unsigned_spec(1, sum, kHalvesUp), squeeze, eight_bit, wide}};
+}
 
 InputStage build_input(const StageInputs& in) {
     require_integer_bits(

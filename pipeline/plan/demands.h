@@ -3,6 +3,7 @@
 #pragma once
 
 #include "pipeline/plan/plan.h"
+#include "pipeline/stages/presets.h"
 
 namespace squint {
 

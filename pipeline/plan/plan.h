@@ -13,7 +13,6 @@
 #include "pipeline/stages/interpolation.h"
 #include "pipeline/stages/location.h"
 #include "pipeline/stages/shading.h"
-#include "scene/presets.h"
 #include "scene/scene.h"
 
 #include <cstdint>

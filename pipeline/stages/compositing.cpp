@@ -1,7 +1,7 @@
 #include "pipeline/stages/compositing.h"
 
 #include "pipeline/stages/inputs.h"
-#include "scene/presets.h"
+#include "pipeline/stages/presets.h"
 
 #include <algorithm>
 #include <cmath>
@@ -21,6 +21,15 @@ void keep_sums_exact(const Scene& scene, WireSpecs& specs) {
         {fraction_bits(Wire::slab_ratio), fraction_bits(Wire::slab_color), fraction_bits(Wire::lit_color)});
     const int whole = color + std::max(fraction_bits(Wire::contribution), fraction_bits(Wire::transparency));
     specs[Wire::color].format.fraction_bits = std::min(whole, kWidest);
+}
+
+std::vector<WireFormats> compositing_wires(const PresetInputs& in) {
+    std::vector<WireFormats> wires;
+    for (const Wire wire : {Wire::contribution, Wire::color, Wire::transparency})
+        wires.push_back({wire, unsigned_spec(1, accumulating_bits(in), kToEven),
+                         unsigned_spec(1, 15, Rounding::trn), unsigned_spec(1, 8, Rounding::trn),
+                         unsigned_spec(1, wide_accumulating_bits(in), kToEven)});
+    return wires;
 }
 
 CompositingStage build_compositing(const StageInputs& in) {

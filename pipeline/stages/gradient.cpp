@@ -1,8 +1,29 @@
 #include "pipeline/stages/gradient.h"
 
 #include "pipeline/stages/inputs.h"
+#include "pipeline/stages/presets.h"
+
+#include <algorithm>
 
 namespace squint {
+
+std::vector<WireFormats> gradient_wires(const PresetInputs& in) {
+    constexpr Rounding trn = Rounding::trn;
+    const int scalar = in.scalar_bits, range = in.gradient_bits > 0 ? in.gradient_bits : scalar,
+              sharp = highlight_bits(in);
+    // Weak gradients want fraction bits; a difference of scalars, halved, has one bit less than they.
+    const Spec standard = signed_spec(range, std::min(12, 32 - range - weight_bits(in)), kToEven),
+               squeeze = signed_spec(12, 12, trn), eight_bit = signed_spec(scalar, 1, trn),
+               wide = signed_spec(scalar, 16, kToEven);
+    return {{Wire::gradient_lerp, standard, squeeze, eight_bit, wide},
+            {Wire::gradient, standard, squeeze, eight_bit, wide},
+            {Wire::spacing, unsigned_spec(1, 12, kToEven), unsigned_spec(1, 12, trn),
+             unsigned_spec(1, 12, trn), unsigned_spec(1, 20, kToEven)},
+            {Wire::normal, signed_spec(1, 15 + sharp, kToEven), signed_spec(1, 12, trn),
+             signed_spec(1, 7, trn), signed_spec(1, held(20 + sharp), kToEven)},
+            {Wire::confidence, unsigned_spec(1, 15, kToEven), unsigned_spec(1, 15, trn),
+             unsigned_spec(1, 8, trn), unsigned_spec(1, 20, kToEven)}};
+}
 
 GradientStage build_gradient(const StageInputs& in) {
     if (in.lit)

@@ -1,10 +1,27 @@
 #include "pipeline/stages/interpolation.h"
 
 #include "pipeline/stages/inputs.h"
+#include "pipeline/stages/presets.h"
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace squint {
+
+std::vector<WireFormats> interpolation_wires(const PresetInputs& in) {
+    constexpr Rounding trn = Rounding::trn;
+    const int scalar = in.scalar_bits;
+    // Lerp levels are cut so that every exact product fits a 32-bit word, I + level + weight <= 31: 12 bits of
+    // weight leave the middle levels 19 - I fraction bits.
+    const Spec level = unsigned_spec(scalar, 31 - scalar - weight_bits(in), kHalvesUp),
+               squeeze = unsigned_spec(12, 12, trn), whole = unsigned_spec(scalar, 0, trn),
+               wide = unsigned_spec(scalar, std::min(20, 30 - scalar), kToEven);
+    return {
+        {Wire::lerp_x, level, squeeze, whole, wide},
+        {Wire::lerp_y, level, squeeze, whole, wide},
+        {Wire::sample, unsigned_spec(scalar, std::min(12, 24 - scalar), kHalvesUp), squeeze, whole, wide}};
+}
 
 InterpolationStage build_interpolation(const StageInputs& in) {
     require_integer_bits(in, Wire::weight, 1, "a weight of 1.0");

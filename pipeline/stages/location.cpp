@@ -2,12 +2,27 @@
 
 #include "core/error.h"
 #include "pipeline/stages/inputs.h"
+#include "pipeline/stages/presets.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
 namespace squint {
+
+std::vector<WireFormats> location_wires(const PresetInputs& in) {
+    constexpr Rounding trn = Rounding::trn;
+    const Spec location = unsigned_spec(in.location_bits, held(31 - in.location_bits), kToEven);
+    return {{Wire::location, location, unsigned_spec(11, 12, trn), unsigned_spec(11, 12, trn),
+             unsigned_spec(in.location_bits, 24, kToEven)},
+            {Wire::direction, signed_spec(in.direction_bits, location.format.fraction_bits, kToEven),
+             signed_spec(1, 12, trn), signed_spec(1, 12, trn), signed_spec(in.direction_bits, 24, kToEven)},
+            {Wire::weight, unsigned_spec(1, weight_bits(in), kHalvesUp), unsigned_spec(1, 12, trn),
+             unsigned_spec(1, 8, trn), unsigned_spec(1, 20, kToEven)},
+            // 2^-10 of a step that is 1 deep is a quarter of an LSB8.
+            {Wire::length, unsigned_spec(1, held(9 + in.whole_depth_bits), kToEven),
+             unsigned_spec(1, 15, trn), unsigned_spec(1, 15, trn), unsigned_spec(1, 22, kToEven)}};
+}
 
 LocationStage build_location(const StageInputs& in) {
     const auto longest =

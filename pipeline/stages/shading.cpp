@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "core/portable_math.h"
 #include "pipeline/stages/inputs.h"
+#include "pipeline/stages/presets.h"
 
 #include <fmt/format.h>
 
@@ -33,6 +34,24 @@ GoochTones build_gooch(const StageInputs& in) {
 }
 
 }  // namespace
+
+std::vector<WireFormats> shading_wires(const PresetInputs& in) {
+    constexpr Rounding trn = Rounding::trn;
+    const int sharp = highlight_bits(in);
+    const Spec squeeze = unsigned_spec(1, 15, trn), eight_bit = unsigned_spec(1, 8, trn),
+               wide = unsigned_spec(1, 20, kToEven), standard = unsigned_spec(1, 14, kToEven),
+               signed_wide = signed_spec(1, held(20 + sharp), kToEven);
+    return {{Wire::light, signed_spec(1, 14 + sharp, kToEven), signed_spec(1, 15, trn),
+             signed_spec(1, 8, trn), signed_wide},
+            {Wire::dot, signed_spec(1, 15 + sharp, kToEven), signed_spec(1, 15, trn), signed_spec(1, 8, trn),
+             signed_wide},
+            {Wire::power, unsigned_spec(1, 15 + sharp, kToEven), unsigned_spec(1, 16, trn), eight_bit,
+             unsigned_spec(1, held(20 + sharp), kToEven)},
+            {Wire::material, standard, squeeze, eight_bit, wide},
+            {Wire::intensity, standard, squeeze, eight_bit, wide},
+            {Wire::lit_color, unsigned_spec(1, accumulating_bits(in), kToEven), squeeze, eight_bit,
+             unsigned_spec(1, wide_accumulating_bits(in), kToEven)}};
+}
 
 ShadingStage build_shading(const StageInputs& in) {
     if (in.lit)

@@ -8,6 +8,7 @@
 #include "pipeline/machines/model.h"
 #include "pipeline/record.h"
 #include "pipeline/render.h"
+#include "scene/presets.h"
 #include "scene/toml.h"
 #include "studies/sweep/cost.h"
 #include "truth/reference.h"

@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "pipeline/machines/model.h"
 #include "pipeline/render.h"
+#include "pipeline/stages/presets.h"
 #include "tests/truth/reference_cases.h"
 #include "truth/reference.h"
 #include "truth/slab_check.h"

@@ -3,7 +3,7 @@
 
 #include "pipeline/classification/methods-inl.h"
 #include "pipeline/classification/tables/linear_entries.h"
-#include "scene/presets.h"
+#include "pipeline/stages/presets.h"
 
 #include <algorithm>
 #include <bit>

@@ -2,7 +2,7 @@
 #include "pipeline/stages/gradient-inl.h"
 
 #include "fixedpoint/words.h"
-#include "scene/presets.h"
+#include "pipeline/stages/presets.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // The presets, and the page that lists them.
-#include "scene/presets.h"
+#include "pipeline/stages/presets.h"
 
 #include "pipeline/render.h"
 
@@ -20,6 +20,25 @@ TEST(Presets, ThePageHoldsTheTableOfEveryWire) {
     EXPECT_NE(page.str().find(preset_table_markdown()), std::string::npos)
         << "write this into docs/pipeline.md:\n"
         << preset_table_markdown();
+}
+
+// A wire that a stage forgets would have a format of no bits.
+TEST(Presets, EveryWireIsSaidOnceByItsOwnStage) {
+    const std::array<std::pair<const char*, std::vector<WireFormats>>, 6> stages{
+        {{"sample location", location_wires({})},
+         {"interpolation", interpolation_wires({})},
+         {"gradient", gradient_wires({})},
+         {"classification", classification_wires({})},
+         {"shading", shading_wires({})},
+         {"compositing", compositing_wires({})}}};
+    std::array<int, kWires> said{};
+    for (const auto& [stage, wires] : stages)
+        for (const WireFormats& formats : wires) {
+            EXPECT_EQ(info(formats.wire).stage, stage) << info(formats.wire).name;
+            ++said[static_cast<std::size_t>(formats.wire)];
+        }
+    for (int i = 0; i < kWires; ++i)
+        EXPECT_EQ(said[static_cast<std::size_t>(i)], 1) << info(static_cast<Wire>(i)).name;
 }
 
 TEST(Presets, SqueezeIsThePaperToTheLetter) {
