@@ -9,6 +9,7 @@
 #include "fixedpoint/words/lane_quotients-inl.h"
 #include "fixedpoint/words/lane_tables-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
+#include "pipeline/machines/lanes/packing-inl.h"
 #include "pipeline/stages/inside-inl.h"
 #include "pipeline/stages/location-inl.h"
 
@@ -52,12 +53,12 @@ int gather_turning_ends(const Plan& plan, const lanes::RayPacket& rays, int step
         auto wanted = hn::Gt(hn::Zero(d), hn::Zero(d));
         if (at < steps * kRays) wanted = thick(at);
         if (at >= kRays) wanted = hn::Or(wanted, thick(at - kRays));
-        const auto many = hn::CountTrue(d, wanted);
-        if (many == 0) continue;
+        if (hn::AllFalse(d, wanted)) continue;
+        const Packing packing(wanted);
         const auto pack = [&](const Word* from, lanes::Batch& to) {
-            hn::StoreU(hn::Compress(hn::Load(d, from), wanted), d, to.v + count);
+            packing(hn::Load(d, from), to.v + count);
         };
-        hn::StoreU(hn::Compress(hn::Iota(d, at), wanted), d, ends.from.v + count);
+        packing(hn::Iota(d, at), ends.from.v + count);
         for (int a = 0; a < 3; ++a) {
             if (from_samples) {
                 pack(s.location[a].v + at, ends.location[0][a]);
@@ -66,7 +67,7 @@ int gather_turning_ends(const Plan& plan, const lanes::RayPacket& rays, int step
             pack(s.cell[a].v + at, ends.cell[0][a]);
             pack(s.weight[a].v + at, ends.weight[0][a]);
         }
-        count += static_cast<int>(many);
+        count += packing.count();
     }
     return count;
 }
@@ -92,12 +93,12 @@ int pick_by_cuts(const Plan& plan, int count, int cuts, const LitSamples& lit, L
     for (int at = 0; at < count; at += kLanes) {
         auto wanted = hn::Eq(hn::Load(d, lit.cuts.v + at), hn::Set(d, cuts));
         wanted = hn::And(wanted, hn::FirstN(d, static_cast<std::size_t>(count - at)));
-        const auto here = hn::CountTrue(d, wanted);
-        if (here == 0) continue;
+        if (hn::AllFalse(d, wanted)) continue;
+        const Packing packing(wanted);
         copy_all([&](const lanes::Batch& from, lanes::Batch& to) {
-            hn::StoreU(hn::Compress(hn::Load(d, from.v + at), wanted), d, to.v + many);
+            packing(hn::Load(d, from.v + at), to.v + many);
         });
-        many += static_cast<int>(here);
+        many += packing.count();
     }
     if (many == 0) return 0;
     copy_all([&](const lanes::Batch&, lanes::Batch& to) {

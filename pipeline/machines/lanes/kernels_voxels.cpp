@@ -8,6 +8,7 @@
 
 #include "fixedpoint/words/lane_tables-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
+#include "pipeline/machines/lanes/packing-inl.h"
 
 #include <algorithm>
 #include <bit>
@@ -162,13 +163,13 @@ int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, int steps
         const int r = at % kRays;
         const auto within = hn::Gt(hn::Load(d, rays.slabs.v + r), hn::Set(d, s.first + at / kRays));
         const auto wanted = hn::And(hn::Gt(hn::Load(d, s.alpha.v + at), zero), within);
-        const auto many = hn::CountTrue(d, wanted);
-        if (many == 0) continue;
+        if (hn::AllFalse(d, wanted)) continue;
+        const Packing packing(wanted);
         // Whole vectors are stored; what lies behind the last sample is written over by the next.
         const auto pack = [&](const Word* from, lanes::Batch& to) {
-            hn::StoreU(hn::Compress(hn::Load(d, from), wanted), d, to.v + count);
+            packing(hn::Load(d, from), to.v + count);
         };
-        hn::StoreU(hn::Compress(hn::Iota(d, at), wanted), d, lit.from.v + count);
+        packing(hn::Iota(d, at), lit.from.v + count);
         for (int end = 0; end < (plan.inside.needs_back() ? 2 : 1); ++end)
             for (int a = 0; a < 3; ++a) {
                 if (locations) {
@@ -188,7 +189,7 @@ int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, int steps
             pack(rays.view[a].v + r, lit.view[a]);
             for (int l = 0; l < plan.shading.lights; ++l) pack(rays.half[l][a].v + r, lit.half[l][a]);
         }
-        count += static_cast<int>(many);
+        count += packing.count();
     }
     return count;
 }

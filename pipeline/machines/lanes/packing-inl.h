@@ -1,0 +1,47 @@
+// The lanes that are wanted, side by side: of many vectors alike.  Compiled once per SIMD target.
+#if defined(SQUINT_PIPELINE_MACHINES_LANES_PACKING_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_PIPELINE_MACHINES_LANES_PACKING_INL_H
+#undef SQUINT_PIPELINE_MACHINES_LANES_PACKING_INL_H
+#else
+#define SQUINT_PIPELINE_MACHINES_LANES_PACKING_INL_H
+#endif
+
+#include "pipeline/machines/lanes/packet.h"
+
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+
+/// Where lanes go, worked out once: g++ 12 copies the table behind Highway's Compress at every use.
+class Packing {
+    using D = hwy::HWY_NAMESPACE::ScalableTag<lanes::Word>;
+
+  public:
+    template <class Mask>
+    HWY_INLINE explicit Packing(Mask wanted)
+        : count_(static_cast<int>(hwy::HWY_NAMESPACE::CountTrue(D(), wanted))),
+          from_(order_of(wanted, count_)) {}
+    int count() const { return count_; }
+    /// Stores the wanted words, and after them others up to a vector's end.
+    template <class V>
+    HWY_INLINE void operator()(V words, lanes::Word* to) const {
+        hwy::HWY_NAMESPACE::StoreU(hwy::HWY_NAMESPACE::TableLookupLanes(words, from_), D(), to);
+    }
+
+  private:
+    using Indices = decltype(hwy::HWY_NAMESPACE::IndicesFromVec(D(), hwy::HWY_NAMESPACE::Zero(D())));
+    template <class Mask>
+    static HWY_INLINE Indices order_of(Mask wanted, int count) {
+        namespace hn = hwy::HWY_NAMESPACE;
+        const auto packed = hn::Compress(hn::Iota(D(), 0), wanted);
+        return hn::IndicesFromVec(
+            D(), hn::IfThenElseZero(hn::FirstN(D(), static_cast<std::size_t>(count)), packed));
+    }
+    int count_;
+    Indices from_;
+};
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif
