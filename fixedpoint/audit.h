@@ -1,4 +1,4 @@
-// What a wire carried: counted by the Audited word, printed by `--audit` and `squint pixel`.
+// Statistics of a wire: the Audited word counts them; `--audit` and `squint pixel` print them.
 #pragma once
 
 #include <array>
@@ -8,20 +8,20 @@
 
 namespace squint {
 
-/// One value arriving on a wire.
+/// One value that arrived on a wire.
 struct TraceEvent {
     int wire = -1;
     double exact = 0;      // before quantising, in units of the wire's last bit
-    std::int64_t raw = 0;  // after
+    std::int64_t raw = 0;  // after quantising
 };
 
 struct WireStatistics {
     std::int64_t count = 0, inexact = 0, saturated = 0, wrapped = 0;
-    std::int64_t underflowed = 0;  // not zero, and zero when rounded
+    std::int64_t underflowed = 0;  // values that were not zero and became zero
     std::int64_t smallest = std::numeric_limits<std::int64_t>::max();
     std::int64_t largest = std::numeric_limits<std::int64_t>::min();
-    std::array<std::int64_t, 64> magnitude{};  // [b]: values whose absolute raw value needs b bits
-    std::vector<TraceEvent>* trace = nullptr;  // every event too, when wanted
+    std::array<std::int64_t, 64> magnitude{};  // [b]: values whose absolute raw value has b bits
+    std::vector<TraceEvent>* trace = nullptr;  // where every event is recorded; null: nowhere
 
     void merge(const WireStatistics& other) {
         count += other.count, inexact += other.inexact, saturated += other.saturated,

@@ -11,9 +11,9 @@ namespace squint {
 namespace {
 
 constexpr int kMostDigits = 18, kMostExponent = 18;
-constexpr Int128 kMostWhole = Int128{1} << 60;  // with 64 fraction bits and a sticky one: 125 bits
+constexpr Int128 kMostWhole = Int128{1} << 60;  // 64 fraction bits and a sticky bit on top: 125 bits
 
-/// floor(value 2^f) of a decimal number, and whether the number lies above it.
+/// floor(value 2^f) of a decimal number, and whether the number exceeds it.
 struct Decimal {
     Exact floor;
     bool sticky = false;
@@ -74,7 +74,7 @@ bool parse_decimal(std::string_view text, Int128& digits, int& scale) {
     return whole < kMostWhole && whole > -kMostWhole;
 }
 
-/// One bit below the last one and "there is more" decide every rounding; the others show the error.
+/// One bit below the last and a sticky bit decide every rounding; more bits show the error.
 constexpr int kGuardBits = 40;
 
 Decimal at_fraction(Int128 digits, int scale, int fraction_bits) {
@@ -91,7 +91,7 @@ Decimal at_fraction(Int128 digits, int scale, int fraction_bits) {
 
 void finish(Calculation& c) {
     const Spec& spec = c.spec;
-    // Sticky in one more bit: below half a unit, above nothing.
+    // The sticky bit goes one bit below: under half a unit, above zero.
     const Int128 x = 2 * c.exact.value + (c.sticky ? 1 : 0);
     const Rescale to(c.exact.fraction_bits + 1, spec);
     const Int128 rounded = round_off(x, to);
@@ -125,7 +125,7 @@ bool is_raw(const std::string& text) {
     return text.starts_with('#') || text.starts_with("0x") || text.starts_with("0X");
 }
 
-/// Takes a Spec from the front of `words`: a format and the rounding and overflow words after it.
+/// Parses a Spec at the front of `words`: a format, then words for rounding and overflow.
 bool take_spec(const std::vector<std::string>& words, std::size_t& at, Spec& spec) {
     Spec taken;
     if (at >= words.size() || !parse_format(words[at], taken.format).empty()) return false;
@@ -167,7 +167,7 @@ struct Operation {
     std::size_t operands;
     Exact (*apply)(const std::vector<Exact>&);
 };
-// Widest: lerp of 24.0 and 0.24 with a signed 24.24 weight, 50 + 49 bits.
+// The widest case: lerp of 24.0 and 0.24 with a signed 24.24 weight, 50 + 49 bits.
 const Operation kOperations[] = {
     {"add", "+", 2, [](const std::vector<Exact>& x) { return sum(x[0], x[1]); }},
     {"sub", "-", 2, [](const std::vector<Exact>& x) { return sum(x[0], x[1], -1); }},
@@ -186,7 +186,7 @@ const Operation* find_operation(const std::string& word) {
 }  // namespace
 
 std::string calculate(const std::vector<std::string>& given, Calculation& out) {
-    // A Spec may come as one word with spaces.
+    // A Spec may be one word that contains spaces.
     std::vector<std::string> words;
     for (const std::string& word : given) {
         std::string part;

@@ -1,4 +1,4 @@
-// A calculator in formats: what `squint number` does, and an oracle for other implementations.
+// A calculator in formats: the arithmetic of `squint number`, and an oracle for other implementations.
 #pragma once
 
 #include "fixedpoint/quantise.h"
@@ -14,40 +14,40 @@ struct Exact {
     int fraction_bits = 0;
 };
 
-/// One operation and what became of it.
+/// One operation, its operands and its result.
 struct Calculation {
     Spec spec;                           // of the result
-    std::string operation;               // "" for a conversion, add, sub, mul, madd, lerp
+    std::string operation;               // add, sub, mul, madd, lerp; "" for a conversion
     std::vector<std::int64_t> operands;  // raw, each in its own format
     std::vector<Format> operand_formats;
-    std::vector<bool> operand_overflow;  // the format's limits changed the operand as it was read
-    Exact exact;                         // what would stand there without an end of bits
-    bool sticky = false;                 // the exact value lies above `exact`, by less than its last bit
+    std::vector<bool> operand_overflow;  // whether the format's limits changed the operand as it was read
+    Exact exact;                         // the result before it is quantised
+    bool sticky = false;                 // the true result exceeds `exact` by less than one last bit
     std::int64_t raw = 0;
-    bool inexact = false;   // rounding changed it
-    bool overflow = false;  // the format's limits changed it
+    bool inexact = false;   // whether rounding changed it
+    bool overflow = false;  // whether the format's limits changed it
 };
 
-/// Words of one operation:
+/// Evaluates one operation, given as words:
 ///
 ///     RESULT NUMBER              u1.15 0.7                     a decimal, rounded once
 ///     RESULT OPERATION OPERAND.. u1.15 trn mul u1.15 0.7 0.7   exact on raw operands, quantised once
 ///
-/// RESULT is a Spec; OPERATION add + sub - mul * madd (a b + c) lerp (a + w (b - a)); an OPERAND is a number
-/// after its Spec, which may be left out where it is the one before (the first: RESULT's).  A number is
-/// decimal (at most 18 digits, rounded to its Spec), #raw or 0xraw.  Returns an empty string and fills `out`,
-/// or one line: what was found, what is allowed.
+/// RESULT is a Spec.  OPERATION is add +, sub -, mul *, madd (a b + c) or lerp (a + w (b - a)).  An OPERAND
+/// is a number after its Spec; without one it takes that of the operand before it, the first that of RESULT.
+/// A number is decimal (at most 18 digits, rounded to its Spec), #raw or 0xraw.  Returns an empty string and
+/// fills `out`; on bad input returns one line that says what was found and what is allowed.
 std::string calculate(const std::vector<std::string>& words, Calculation& out);
 
-/// Every digit: "0.0001220703125", "-3".
+/// All digits of the value: "0.0001220703125", "-3".
 std::string decimal(const Exact& exact);
-/// "0x599a", the bits of two's complement.
+/// The bits of the two's complement in hexadecimal: "0x599a".
 std::string hex(std::int64_t raw, const Format& format);
-/// "0.101100110011010": sign, integer and fraction bits of two's complement, with a point before the
-/// fraction.
+/// The bits of the two's complement with a binary point before the fraction: "0.101100110011010" is a sign,
+/// integer and fraction bits.
 std::string bits(std::int64_t raw, const Format& format);
 
-/// Result less exact value; `last_bits` counts it in units of the result's last bit.
+/// The result minus the exact value; `last_bits` gives it in units of the result's last bit.
 Exact error_of(const Calculation& calculation);
 double last_bits(const Calculation& calculation);
 

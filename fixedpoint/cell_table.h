@@ -1,5 +1,5 @@
-// A square table of cells of four raw numbers (red, green, blue, alpha), in as few bytes as its words allow:
-// 4096 x 4096 cells of 16 bits are 128 MiB.  Every word reads a cell at once: gather_cell.
+// A square table whose nodes hold four raw numbers (red, green, blue, alpha), in 16 bits each where they fit:
+// 4096 x 4096 nodes then take 128 MiB.  Every word reads all four at once (gather_cell).
 #pragma once
 
 #include "fixedpoint/words.h"
@@ -14,16 +14,16 @@
 
 namespace squint {
 
-/// size x size cells; cell (row, column), channel c at (row * size + column) * 4 + c.  Copies share what was
-/// built.
+/// size x size nodes; node (row, column), channel c, lies at (row * size + column) * 4 + c.  Copies share the
+/// data.
 class CellTable {
   public:
-    int wire = -1;        // whose it is, for attribution
-    int alpha_wire = -1;  // of the last channel
-    bool active = true;   // Real reads the quantised words, or (false) the exact values
+    int wire = -1;        // the wire of red, green and blue, to which audits attribute them
+    int alpha_wire = -1;  // the wire of alpha
+    bool active = true;   // whether Real reads the quantised words; false: the exact values
 
     CellTable() = default;
-    /// Words are at most `largest`: 16 bits each where they fit, else 32.
+    /// Allocates words for values up to `largest`: 16 bits each where that fits, else 32.
     CellTable(int size, std::int64_t largest) : size_(size), data_(std::make_shared<Data>()) {
         data_->largest = largest;
         if (largest <= 0xffff)
@@ -49,19 +49,19 @@ class CellTable {
         const std::size_t at = index(row, column, channel);
         return is_narrow() ? data_->narrow[at] : data_->wide[at];
     }
-    /// Unrounded, in raw units.  Only behind need_exact().
+    /// The value before rounding, in raw units.  Call need_exact() first.
     double exact(std::int64_t row, std::int64_t column, int channel) const {
         return data_->exact[index(row, column, channel)];
     }
-    /// What fills the unrounded values, in raw units, the first time they are asked for: they take four times
-    /// the words' room.
+    /// Sets the function that computes the exact values, in raw units.  It is called when they are first
+    /// needed, because they take four times the room of the words.
     void exact_from(std::function<std::vector<double>()> build) { data_->build_exact = std::move(build); }
     void need_exact() const {
         if (!data_) return;
         const std::lock_guard lock(data_->mutex);
         if (data_->exact.empty()) data_->exact = data_->build_exact();
     }
-    /// The same in float32, in half that room; null before need_floats().
+    /// The exact values in float32, in half the room of doubles; null before need_floats().
     const float* floats() const { return data_->floats.empty() ? nullptr : data_->floats.data(); }
     void need_floats() const {
         if (!data_) return;
@@ -77,7 +77,7 @@ class CellTable {
     }
 
   private:
-    static constexpr std::size_t kPadding = 8;  // a vector gather may read a whole cell behind the last
+    static constexpr std::size_t kPadding = 8;  // a vector gather may read one node past the last
     struct Data {
         std::vector<std::uint16_t> narrow;
         std::vector<std::uint32_t> wide;
@@ -110,14 +110,14 @@ template <class T>
 std::array<Real<T>, 4> gather_cell(const CellTable& t, Real<T> row, Real<T> column) {
     std::array<Real<T>, 4> cell;
     const auto i = static_cast<std::int64_t>(row.v), j = static_cast<std::int64_t>(column.v);
-    const bool floats = std::is_same_v<T, float> && t.floats();  // then there may be no doubles
+    const bool floats = std::is_same_v<T, float> && t.floats();  // then doubles may be missing
     for (int c = 0; c < 4; ++c)
         cell[static_cast<std::size_t>(c)].v = t.active ? static_cast<T>(t.word(i, j, c))
                                               : floats ? static_cast<T>(t.float_at(i, j, c))
                                                        : static_cast<T>(t.exact(i, j, c));
     return cell;
 }
-/// Any word the format holds; the index, too, must fit.
+/// Any word of the table's format; the index must fit the word as well.
 inline std::array<Range, 4> gather_cell(const CellTable& t, Range, Range) {
     note_wire(WordTag<Range>{}, t.wire), note_wire(WordTag<Range>{}, t.alpha_wire);
     noted({0, t.rows() * 4});
@@ -125,7 +125,7 @@ inline std::array<Range, 4> gather_cell(const CellTable& t, Range, Range) {
     return {any, any, any, any};
 }
 
-/// Cells (row, column) and (row, column + 1).
+/// Nodes (row, column) and (row, column + 1).
 template <class W>
 std::array<std::array<W, 4>, 2> gather_two_cells(const CellTable& t, W row, W column) {
     return {gather_cell(t, row, column), gather_cell(t, row, column + constant<W>(1))};

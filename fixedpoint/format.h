@@ -1,4 +1,4 @@
-// Formats: how a number is cut to bits.  Plain values, chosen at run time.
+// Fixed-point formats, roundings and overflow rules: plain values, chosen at run time.
 //
 //   u1.15   i . fffffffffffffff      16 bits, 1.0 is raw 1 << 15
 //   s1.12   s i . ffffffffffff       14 bits: the sign bit is extra
@@ -26,10 +26,10 @@ struct Format {
 };
 
 inline constexpr int kMostIntegerBits = 24, kMostFractionBits = 29;
-/// The most fraction bits that presets and tables choose by themselves where more were of no use.
+/// Presets and tables choose no more fraction bits than these by themselves: more would not show.
 inline constexpr int kMostChosenFractionBits = 24;
 
-/// What happens to bits below the last one.  SystemC's SC_TRN, SC_TRN_ZERO, SC_RND, SC_RND_CONV.
+/// What happens to the bits below the last one: SystemC's SC_TRN, SC_TRN_ZERO, SC_RND and SC_RND_CONV.
 enum class Rounding : std::uint8_t {
     trn,       // towards minus infinity: the bits are dropped
     trn_zero,  // towards zero
@@ -37,10 +37,10 @@ enum class Rounding : std::uint8_t {
     rnd_conv,  // to nearest, halves to even
 };
 
-/// What happens above the first bit.  SystemC's SC_SAT and SC_WRAP.
+/// What happens to values outside the format: SystemC's SC_SAT and SC_WRAP.
 enum class Overflow : std::uint8_t { sat, wrap };
 
-/// Everything a wire does to a number that arrives on it: round first, then overflow.
+/// All that a wire does to a number that arrives on it: it rounds first and limits second.
 struct Spec {
     Format format;
     Rounding rounding = Rounding::rnd_conv;
@@ -53,11 +53,11 @@ std::string to_string(Rounding rounding);     // "rnd_conv"
 std::string to_string(Overflow overflow);     // "sat"
 std::string to_string(const Spec& spec);      // "u1.15 rnd_conv sat"
 
-/// Each returns an empty string and fills `out`, or returns what is wrong in one line.
+/// Parsers.  Each returns an empty string and fills `out`, or returns one line that says what is wrong.
 std::string parse_format(std::string_view text, Format& out);
 std::string parse_rounding(std::string_view text, Rounding& out);
 std::string parse_overflow(std::string_view text, Overflow& out);
-/// "u1.15", "u1.15 trn", "u1.15 rnd wrap": what is left out keeps its value in `out`.
+/// "u1.15", "u1.15 trn", "u1.15 rnd wrap": a part that is left out keeps its value in `out`.
 std::string parse_spec(std::string_view text, Spec& out);
 
 }  // namespace squint

@@ -1,4 +1,4 @@
-// Filling tables: many words at a time where their rounding is the usual one.
+// Fills tables: with SIMD where their rounding is the usual one.
 #include "fixedpoint/table.h"
 
 #include <algorithm>
@@ -17,8 +17,8 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// scale, low and high repeat after `period` values, a multiple of every vector's lanes.  False where a word
-/// needs more than 32 bits, which without kMayBeWide the limits exclude.
+/// scale, low and high repeat after `period` values, a multiple of every vector's lanes.  Returns false where
+/// a word needs more than 32 bits; without kMayBeWide the limits exclude that.
 template <bool kMayBeWide>
 bool quantised(const double* HWY_RESTRICT values, std::size_t count, const double* HWY_RESTRICT scale,
                const double* HWY_RESTRICT low, const double* HWY_RESTRICT high, std::size_t period,
@@ -56,7 +56,7 @@ bool QuantiseRows(const double* HWY_RESTRICT values, std::size_t count, const do
     return (narrow ? quantised<false> : quantised<true>)(values, count, scale, low, high, period, words);
 }
 
-/// False where a word has more than 16 bits.
+/// Returns false where a word has more than 16 bits.
 bool PairRows(const std::int32_t* HWY_RESTRICT words, std::size_t count, std::int32_t* HWY_RESTRICT paired) {
     const hn::ScalableTag<std::int32_t> d;
     const auto less = hn::Set(d, static_cast<std::int32_t>(0x80008000u));

@@ -1,4 +1,4 @@
-// Tables whose entries are raw numbers: built once from real values, read by every word.
+// Tables of raw numbers, built once from real values and read by every word.
 #pragma once
 
 #include "fixedpoint/quantise.h"
@@ -13,16 +13,16 @@
 
 namespace squint {
 
-/// Rows of `columns` raw numbers; row i, column c at i * columns + c.  Words are kept in 32 bits, or in 64
-/// where one does not fit.  Copies share what was built.
+/// Rows of `columns` raw numbers; row i, column c lies at i * columns + c.  Words take 32 bits, or 64 where
+/// one does not fit 32.  Copies share the data.
 class Table {
   public:
-    int wire = -1;                 // whose it is, for attribution
-    std::optional<int> last_wire;  // of the last column, where it differs; -1: nobody's
-    bool active = true;            // Real reads the quantised words, or (false) the exact values
+    int wire = -1;                 // the wire of its columns, to which audits attribute them
+    std::optional<int> last_wire;  // the wire of the last column, where it differs; -1: none
+    bool active = true;            // whether Real reads the quantised words; false: the exact values
 
     Table() = default;
-    /// Zeros.  The exact values take twice the words' room: without `keeps_exact` there are none.
+    /// A table of zeros.  `keeps_exact` keeps the exact values beside the words, which take twice their room.
     Table(int rows, int columns, bool keeps_exact = true);
 
     int wire_of(int column) const { return last_wire && column == columns_ - 1 ? *last_wire : wire; }
@@ -33,21 +33,21 @@ class Table {
                static_cast<std::size_t>(column);
     }
 
-    /// The word, rounded to its Spec.
+    /// The raw word, rounded to its Spec.
     std::int64_t word(std::int64_t row, int column) const {
         const std::size_t at = index(row, column);
         return data_->narrow ? data_->narrow[at] : data_->wide[at];
     }
-    /// Unrounded, in raw units: value * 2^F.  Only where has_exact().
+    /// The value before rounding, in raw units: value * 2^F.  Only where has_exact().
     double exact(std::int64_t row, int column) const { return data_->exact[index(row, column)]; }
     bool has_exact() const { return !data_ || !data_->exact.empty(); }
-    /// The words where all fit 32 bits: what lanes read; null otherwise.
+    /// The words, where all fit 32 bits, for lanes; else null.
     const std::int32_t* narrow() const { return data_ ? data_->narrow.get() : nullptr; }
-    /// The words where narrow() is null.
+    /// The words, where narrow() is null.
     const std::int64_t* wide() const { return data_ ? data_->wide.get() : nullptr; }
-    /// Of a table of four columns of unsigned 16-bit words: word c of row i in the low half, the same of row
-    /// i + 1 in the high half, at i * 4 + c, each less 2^15 and signed.  One load for lanes that blend two
-    /// rows.  Null where a word does not fit.  Made by pair_rows(), once the table is built.
+    /// For tables of four columns of unsigned 16-bit words: at i * 4 + c word c of row i in the low half and
+    /// that of row i + 1 in the high half, each minus 2^15 and signed.  Lanes that blend two rows load both
+    /// at once.  Null where a word does not fit.  pair_rows() makes them, once the table is built.
     const std::int32_t* paired() const { return data_ ? data_->paired.get() : nullptr; }
     void pair_rows();
     /// The exact values in float32, for lanes of floats; null before need_floats().
@@ -63,15 +63,15 @@ class Table {
     void set_raw(int row, int column, std::int64_t raw) {
         put(index(row, column), static_cast<double>(raw), raw);
     }
-    /// All rows at once, many words at a time: real values in the table's order, each column to its Spec.
+    /// Sets all rows at once, with SIMD: real values in the table's order, a Spec for each column.
     void fill(std::span<const double> values, std::span<const Spec> columns);
-    /// All words at once, made elsewhere, without exact values.
+    /// Takes all words at once, without exact values.
     void take(std::unique_ptr<std::int32_t[]> words) { data_->narrow = std::move(words); }
-    /// Where a word is not the rounding of its exact value: an encoding's.
+    /// Sets the exact value of a word that is not its rounding: of an encoded value.
     void set_exact(int row, int column, double value, const Format& format) {
         if (has_exact()) data_->exact[index(row, column)] = value * static_cast<double>(format.one());
     }
-    /// The rows of a table built alike, with its exact values.
+    /// Shares the rows and exact values of a table that was built in the same way.
     void share(const Table& other) { data_ = other.data_; }
 
   private:
@@ -89,9 +89,9 @@ class Table {
     std::shared_ptr<Data> data_;
 };
 
-/// Rows of `scale.size()` columns: the nearest whole number, halves to even, of value * scale within [low,
-/// high], column by column; |low|, |high| <= 2^51, and NaN gives 0.  False, and the words are nobody's, where
-/// one needs more than 32 bits.
+/// Rounds value * scale to the nearest integer, halves to even, within [low, high], in rows of scale.size()
+/// columns; |low|, |high| <= 2^51, and NaN gives 0.  Returns false, with undefined `words`, where one needs
+/// more than 32 bits.
 bool quantise_rows(std::span<const double> values, std::span<const double> scale, std::span<const double> low,
                    std::span<const double> high, std::int32_t* words);
 

@@ -1,5 +1,5 @@
-// Loops of a few rounds written out: what they index stays in registers, which compilers do not see in time
-// of an array whose loop they unroll themselves.
+// Short loops unrolled by hand, because compilers leave an array in memory if they unroll its loop late.  By
+// hand, the array stays in registers.
 #if defined(SQUINT_FIXEDPOINT_UNROLLED_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SQUINT_FIXEDPOINT_UNROLLED_INL_H
 #undef SQUINT_FIXEDPOINT_UNROLLED_INL_H
@@ -14,7 +14,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
-/// f(0), f(1), f(2): axes, channels.  f should be SQUINT_WRITTEN_OUT.
+/// Calls f(0), f(1) and f(2): for axes and colour channels.  f should be SQUINT_WRITTEN_OUT.
 template <class F>
 HWY_INLINE void for_three(F&& f) {
     f(std::size_t{0}), f(std::size_t{1}), f(std::size_t{2});

@@ -1,4 +1,4 @@
-// Every scalar word that a stage's arithmetic can run in.  What a stage may use of them: words/word.h.
+// All scalar words in which a stage's arithmetic can run.  words/word.h says what a stage may use of them.
 //
 // Integer<W>   the model: 64 bits, or 128 where a product needs them
 // Audited      the model, counting what every wire carried
@@ -6,7 +6,7 @@
 // Range        intervals: what a stage's exact results can reach
 // Lanes        many samples side by side: words/lanes-inl.h and its neighbours
 //
-// Wide<W>      beside W, for the few numbers that need more bits than all others: words/word.h
+// Wide<W>      beside W, for the few numbers that need more bits than the others: words/word.h
 #pragma once
 
 #include "fixedpoint/words/audited.h"

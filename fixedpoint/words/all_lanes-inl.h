@@ -1,4 +1,4 @@
-// All of the lanes' arithmetic, and the assertion that lanes are words; compiled once per SIMD target.
+// All arithmetic of lanes, and the assertion that lanes are words; compiled once per SIMD target.
 #if defined(SQUINT_FIXEDPOINT_WORDS_ALL_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SQUINT_FIXEDPOINT_WORDS_ALL_LANES_INL_H
 #undef SQUINT_FIXEDPOINT_WORDS_ALL_LANES_INL_H

@@ -1,4 +1,4 @@
-// The model's 128-bit word that counts what arrives on each wire.
+// The model's 128-bit word, which counts what arrives on each wire.
 #pragma once
 
 #include "fixedpoint/audit.h"

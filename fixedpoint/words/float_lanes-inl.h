@@ -1,7 +1,7 @@
-// The float32 word of the fast path: many Real<float> (words.h) side by side, for the comparison of fixed
-// point with floating point.  Nothing is rounded but by float itself: a Rescale multiplies by a power of two,
-// exactly. Each operation is one of IEEE 754's, in Real's own order and without fused products, which not
-// every target has: the scalar word's bits on every CPU.
+// The float32 word of the fast path: many Real<float> (words.h) side by side, to compare fixed with floating
+// point.  Only float itself rounds: a Rescale multiplies by a power of two, exactly.  Each operation is one
+// of IEEE 754, in the order of Real and without fused products, which some targets lack: the bits of the
+// scalar word on every CPU.
 #if defined(SQUINT_FIXEDPOINT_WORDS_FLOAT_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SQUINT_FIXEDPOINT_WORDS_FLOAT_LANES_INL_H
 #undef SQUINT_FIXEDPOINT_WORDS_FLOAT_LANES_INL_H
@@ -48,7 +48,7 @@ template <KnownRescales K>
 HWY_INLINE Lanes<float, K> operator/(Lanes<float, K> a, Lanes<float, K> b) {
     return {hn::Div(a.v, b.v)};
 }
-// Of equal operands, which may be zeros of either sign, the first: x86's instructions give their second.
+// Of equal operands (zeros of either sign) returns the first; x86's instructions return the second.
 template <KnownRescales K>
 HWY_INLINE Lanes<float, K> min(Lanes<float, K> a, Lanes<float, K> b) {
 #if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
@@ -81,12 +81,12 @@ template <KnownRescales K>
 HWY_INLINE Lanes<float, K> floor_shift(Lanes<float, K> x, int bits) {
     const auto scaled = hn::Mul(x.v, lanes_detail::float_power_of_two(-bits));
 #if HWY_TARGET == HWY_SCALAR || HWY_TARGET == HWY_EMU128
-    return {hn::CopySign(hn::Floor(scaled), scaled)};  // theirs forgets the sign of zero
+    return {hn::CopySign(hn::Floor(scaled), scaled)};  // hn::Floor loses the sign of zero
 #else
     return {hn::Floor(scaled)};
 #endif
 }
-/// 2^x of whole numbers, -127 < x < 128.
+/// 2^x of an integer, -127 < x < 128.
 template <KnownRescales K>
 HWY_INLINE Lanes<float, K> whole_power_of_two(Lanes<float, K> x) {
     const hn::ScalableTag<std::int32_t> d;
@@ -130,7 +130,7 @@ HWY_INLINE Lanes<float, K> gather(const Table& table, Lanes<float, K> row, int c
         hn::Add(hn::Mul(lanes_detail::to_integers(row), hn::Set(d, table.columns())), hn::Set(d, column));
     return {hn::GatherIndex(hn::ScalableTag<float>(), table.floats(), index)};
 }
-/// Four floats at 4 position, and the four behind them.
+/// Four floats at index 4 position, and the four after them.
 template <KnownRescales K>
 HWY_INLINE std::array<std::array<Lanes<float, K>, 4>, 2> load_two_rows(
     const float* rows, Lanes<float, K>, hn::Vec<hn::ScalableTag<std::int32_t>> position) {
@@ -173,7 +173,7 @@ HWY_INLINE std::array<Lanes<float, K>, 4> gather_cell(const CellTable& table, La
 
 // ------------------------------------------------------------------------------------------ memory
 
-/// A float's bits are its word in the buffers between stages.
+/// In the buffers between stages a float is stored as its bits.
 template <KnownRescales K>
 HWY_INLINE Lanes<float, K> load(WordTag<Lanes<float, K>>, const std::int32_t* from) {
     return {hn::BitCast(hn::ScalableTag<float>(), hn::LoadU(hn::ScalableTag<std::int32_t>(), from))};
@@ -183,7 +183,7 @@ HWY_INLINE void store(Lanes<float, K> x, std::int32_t* to) {
     const hn::ScalableTag<std::int32_t> d;
     hn::StoreU(hn::BitCast(d, x.v), d, to);
 }
-/// Whole numbers stay integers there.
+/// Integers stay integers in the buffers.
 template <KnownRescales K>
 HWY_INLINE Lanes<float, K> load_whole(WordTag<Lanes<float, K>>, const std::int32_t* from) {
     return {hn::ConvertTo(hn::ScalableTag<float>(), hn::LoadU(hn::ScalableTag<std::int32_t>(), from))};

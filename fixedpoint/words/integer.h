@@ -14,13 +14,13 @@ namespace squint {
 template <class W>
 struct WordTag {};
 
-/// The word that holds an integer.
+/// An integer as a word.
 template <class W>
 constexpr W constant(std::int64_t value) {
     return make_word(WordTag<W>{}, value);
 }
 
-/// Says that a constant stands on a wire, by its index, or a table's word (-1: none): for words that list wires.
+/// Tells words that list wires that a constant stands on wire `int`, or a table's word does (-1: none).
 template <class W>
 constexpr void note_wire(WordTag<W>, int) {}
 
@@ -68,23 +68,23 @@ W gather(const Table& table, W row, int column) {
     return table.word(static_cast<std::int64_t>(row), column);
 }
 
-/// v0 + w (v1 - v0) with a weight of `weight_bits` fraction bits, exact: lies between v0 and v1, shifted.
+/// v0 + w (v1 - v0), exact, for a weight of `weight_bits` fraction bits: v0 and v1 shifted, or between them.
 template <Integer W>
 constexpr W blend(W v0, W v1, W weight, int weight_bits) {
     return shift_left(v0, weight_bits) + weight * (v1 - v0);
 }
-/// p + k v, known by its meaning to lie in [low, high].
+/// p + k v.  The caller promises that it lies in [low, high].
 template <Integer W>
 constexpr W affine(W p, W k, W v, std::int64_t, std::int64_t) {
     return p + k * v;
 }
-/// x, known by its meaning to lie in [low, high].
+/// x.  The caller promises that it lies in [low, high].
 template <Integer W>
 constexpr W within(W x, std::int64_t, std::int64_t) {
     return x;
 }
 
-/// Bits of |x|: 0 for 0.  x >= 0.
+/// The number of bits of x >= 0; 0 for 0.
 constexpr std::int64_t bit_length(std::int64_t x) {
     return std::bit_width(static_cast<std::uint64_t>(x));
 }
@@ -92,7 +92,7 @@ constexpr Int128 bit_length(Int128 x) {
     const auto high = static_cast<std::uint64_t>(static_cast<unsigned __int128>(x) >> 64);
     return high ? 64 + std::bit_width(high) : std::bit_width(static_cast<std::uint64_t>(x));
 }
-/// x 2^bits for bits of either sign; bits below the last are dropped (floor).
+/// x 2^bits for bits of either sign; a right shift drops bits (floor).
 template <Integer W>
 constexpr W shift_by(W x, W bits) {
     return bits >= 0 ? shift_left(x, static_cast<int>(bits)) : floor_shift(x, static_cast<int>(-bits));
@@ -106,8 +106,8 @@ W vector_length(const std::array<W, 3>& v, int guard) {
     return static_cast<std::int64_t>(std::sqrt(static_cast<double>(static_cast<std::int64_t>(squares))));
 }
 
-/// numerator / denominator, exact, then quantised once.  numerator >= 0, denominator > 0.  `to` is built with
-/// (numerator's - denominator's) fraction bits, which must not exceed the wire's own.
+/// numerator / denominator, computed exactly and quantised once; numerator >= 0, denominator > 0.  `to` is
+/// built with (numerator's - denominator's) fraction bits, which must not exceed the wire's own.
 template <Integer W>
 constexpr W quotient(W numerator, W denominator, const Rescale& to) {
     assert(to.shift <= 0);

@@ -1,5 +1,5 @@
-// Quotients and roots of lanes, and their wide numbers: estimates in floating point, corrected in integers,
-// so that they have the same bits as the model's on every CPU.
+// Quotients, roots and wide numbers of lanes.  Floating point gives an estimate, integers correct it: the
+// model's bits on every CPU.
 #if defined(SQUINT_FIXEDPOINT_WORDS_LANE_QUOTIENTS_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SQUINT_FIXEDPOINT_WORDS_LANE_QUOTIENTS_INL_H
 #undef SQUINT_FIXEDPOINT_WORDS_LANE_QUOTIENTS_INL_H
@@ -21,8 +21,8 @@ HWY_INLINE auto to_floats(Lanes<T, K> x) {
 }
 }  // namespace lanes_detail
 
-/// Bits of x >= 0: the exponent of x with every bit below a set one cleared, which no rounding carries into
-/// the next power.
+/// The number of bits of x >= 0.  It is the exponent of x as a float; every bit below a set one is cleared
+/// first, so that rounding cannot carry into the next power.
 template <class T, KnownRescales K>
 HWY_INLINE Lanes<T, K> bit_length(Lanes<T, K> x) {
     const hn::ScalableTag<T> d;
@@ -33,7 +33,7 @@ HWY_INLINE Lanes<T, K> bit_length(Lanes<T, K> x) {
     return {
         hn::IfThenZeroElse(hn::Eq(x.v, hn::Zero(d)), hn::Sub(exponent, hn::Set(d, static_cast<T>(kBias))))};
 }
-/// x 2^bits, floor; x >= 0.
+/// floor(x 2^bits) for bits of either sign; x >= 0.
 template <class T, KnownRescales K>
 HWY_INLINE Lanes<T, K> shift_by(Lanes<T, K> x, Lanes<T, K> bits) {
     using U = std::make_unsigned_t<T>;
@@ -44,15 +44,15 @@ HWY_INLINE Lanes<T, K> shift_by(Lanes<T, K> x, Lanes<T, K> bits) {
                right = hn::BitCast(du, hn::Max(hn::Sub(zero, bits.v), zero));
     return {hn::BitCast(d, hn::Shr(hn::Shl(hn::BitCast(du, x.v), left), right))};
 }
-/// See words.h: the root in double precision has the right floor.
+/// words.h says why the root in double precision has the right floor.
 template <KnownRescales K>
 HWY_INLINE Lanes<std::int64_t, K> vector_length(const std::array<Lanes<std::int64_t, K>, 3>& v, int guard) {
     const hn::ScalableTag<std::int64_t> d;
     const auto squares = shift_left(v[0] * v[0] + v[1] * v[1] + v[2] * v[2], 2 * guard);
     return {hn::ConvertTo(d, hn::Sqrt(lanes_detail::to_floats(squares)))};
 }
-/// guard <= 8: the sum of squares fills 32 bits, unsigned, and a root 24.  In floats it is 1.1 off at most;
-/// what its square leaves of the sum fits 32 bits again, and tells the floor.
+/// guard <= 8: the sum of squares fills 32 unsigned bits, and the root 24.  The root in floats is off by at
+/// most 1.1; the sum minus its square fits 32 bits again, and decides the floor.
 template <KnownRescales K>
 HWY_INLINE Lanes<std::int32_t, K> vector_length(const std::array<Lanes<std::int32_t, K>, 3>& v, int guard) {
     const hn::ScalableTag<std::int32_t> d;
@@ -72,7 +72,7 @@ HWY_INLINE Lanes<std::int32_t, K> vector_length(const std::array<Lanes<std::int3
     return {hn::IfThenElse(hn::Gt(rest, twice), hn::Add(length, one), length)};
 }
 
-/// The lowest bits of a product, whatever its factors: all 32 or 64 of them.
+/// The lowest 32 or 64 bits of a product of any factors.
 template <KnownRescales K>
 HWY_INLINE Lanes<std::int32_t, K> low_product(Lanes<std::int32_t, K> a, Lanes<std::int32_t, K> b) {
     return a * b;
@@ -91,7 +91,7 @@ HWY_INLINE Lanes<std::int64_t, K> low_product(Lanes<std::int64_t, K> a, Lanes<st
 }
 
 namespace lanes_detail {
-/// An estimate of scaled / denominator, a whole number off by one at most, is put right by its exact rest.
+/// Corrects an estimate of scaled / denominator, an integer off by at most one, by its exact remainder.
 template <class T, KnownRescales K>
 HWY_INLINE Lanes<T, K> corrected(Lanes<T, K> q, Lanes<T, K> scaled, Lanes<T, K> denominator,
                                  const Rescale& to) {
@@ -100,7 +100,7 @@ HWY_INLINE Lanes<T, K> corrected(Lanes<T, K> q, Lanes<T, K> scaled, Lanes<T, K> 
     const auto rest = (scaled - low_product(q, denominator)).v, below = denominator.v;
     auto down = hn::Lt(rest, zero), up = hn::Not(hn::Lt(rest, below));
     if (to.rounding == Rounding::rnd || to.rounding == Rounding::rnd_conv) {
-        // Halves go up, or from the odd one to its neighbour.
+        // Halves go up (rnd), or to the even neighbour (rnd_conv).
         const auto twice = hn::Add(rest, rest), odd = hn::And(q.v, one);
         const bool to_even = to.rounding == Rounding::rnd_conv;
         up = hn::Gt(hn::Add(twice, to_even ? odd : one), below);
@@ -109,8 +109,8 @@ HWY_INLINE Lanes<T, K> corrected(Lanes<T, K> q, Lanes<T, K> scaled, Lanes<T, K> 
     q.v = hn::IfThenElse(up, hn::Add(q.v, one), q.v);
     return {hn::IfThenElse(down, hn::Sub(q.v, one), q.v)};
 }
-/// The integer nearest to x, |x| <= 2^22 (floats) or 2^51: the sum with 1.5 times the power of two whose last
-/// bit is one has it in its own last bits.
+/// The integer nearest to x; |x| <= 2^22 (floats) or 2^51.  Adding 1.5 times the power of two whose last bit
+/// is one leaves it in the lowest bits of the sum.
 template <class T, class V>
 HWY_INLINE auto nearest_whole(V x) {
     const hn::ScalableTag<T> d;
@@ -139,8 +139,8 @@ HWY_INLINE std::array<Lanes<T, K>, N> quotients(const std::array<Lanes<T, K>, N>
 }
 }  // namespace lanes_detail
 
-/// words.h's.  32-bit lanes: results of at most 22 bits, denominators below 2^29 (pipeline/plan/plan.cpp
-/// checks). Four roundings of floats are one at most of such a result.  Saturating wires only.
+/// quotient() of words.h.  In 32-bit lanes results have at most 22 bits and denominators are below 2^29 (the
+/// plan checks it): four roundings of floats then err by at most one.  Saturating wires only.
 template <class T, KnownRescales K>
 HWY_INLINE Lanes<T, K> quotient(Lanes<T, K> numerator, Lanes<T, K> denominator, const Rescale& to) {
     return lanes_detail::quotients(std::array{numerator}, denominator, to)[0];
@@ -153,7 +153,7 @@ HWY_INLINE std::array<Lanes<T, K>, 3> quotients(const std::array<Lanes<T, K>, 3>
 
 // ------------------------------------------------------------------------------------ wide numbers
 
-/// words.h's Wide of 32-bit lanes: doubles, the lower half of the lanes and the upper one.
+/// Wide<W> of 32-bit lanes: doubles, for the lower half of the lanes and for the upper one.
 template <KnownRescales K>
 struct WideLanes {
     using V = hn::Vec<hn::ScalableTag<double>>;
@@ -175,7 +175,7 @@ template <KnownRescales K>
 HWY_INLINE Lanes<std::int32_t, K> narrow(const WideLanes<K>& x) {
     const hn::ScalableTag<std::int32_t> d;
 #if HWY_TARGET == HWY_SCALAR
-    return {hn::DemoteTo(d, x.low)};  // saturates, as the vectors' does
+    return {hn::DemoteTo(d, x.low)};  // saturates, like the DemoteTo of vectors
 #else
     const hn::Half<decltype(d)> half;
     return {hn::Combine(d, hn::DemoteTo(half, x.high), hn::DemoteTo(half, x.low))};
@@ -191,7 +191,7 @@ HWY_INLINE WideLanes<K> by_halves(F&& f) {
 #endif
 }
 }  // namespace lanes_detail
-/// 64-bit lanes are wide themselves.
+/// For 64-bit lanes, Wide<W> is W.
 template <KnownRescales K>
 HWY_INLINE Lanes<std::int64_t, K> widen(Lanes<std::int64_t, K> x) {
     return x;
@@ -256,8 +256,8 @@ template <KnownRescales K>
 HWY_INLINE bool any_positive(Lanes<std::int64_t, K> x) {
     return any(constant<Lanes<std::int64_t, K>>(0) < x);
 }
-/// An estimate, off by one at most, and its exact rest: the product of either half of the estimate with the
-/// denominator has 53 bits at most (range.cpp notes it).  A result beyond 32 bits saturates.
+/// An estimate, off by at most one, corrected by its exact remainder: one half of the estimate times the
+/// denominator has at most 53 bits (range.cpp notes it).  Results beyond 32 bits saturate.
 template <KnownRescales K>
 HWY_INLINE Lanes<std::int32_t, K> quotient(const WideLanes<K>& numerator, const WideLanes<K>& denominator,
                                            const Rescale& to) {
@@ -270,7 +270,7 @@ HWY_INLINE Lanes<std::int32_t, K> quotient(const WideLanes<K>& numerator, const 
         const auto estimate = hn::Mul(scaled, hn::Div(one, below));
         auto q = to_nearest ? hn::Round(estimate) : hn::Trunc(estimate);
 #if (HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2 && HWY_TARGET != HWY_SCALAR) || HWY_ARCH_ARM_A64
-        const auto rest = hn::NegMulAdd(q, below, scaled);  // one rounding alone
+        const auto rest = hn::NegMulAdd(q, below, scaled);  // rounds once
 #else
         const auto coarse = hn::Mul(hn::Trunc(hn::Mul(q, hn::Set(d, power_of_two<double>(-to.width / 2)))),
                                     hn::Set(d, power_of_two<double>(to.width / 2)));

@@ -1,4 +1,4 @@
-// What lanes read of tables: rows, cells, and neighbours packed two a word, many addresses at once.
+// How lanes read tables: rows, nodes and packed pairs of neighbours, at one address a lane.
 #if defined(SQUINT_FIXEDPOINT_WORDS_LANE_TABLES_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SQUINT_FIXEDPOINT_WORDS_LANE_TABLES_INL_H
 #undef SQUINT_FIXEDPOINT_WORDS_LANE_TABLES_INL_H
@@ -34,7 +34,7 @@ HWY_INLINE Lanes<std::int64_t, K> gather(const Table& table, Lanes<std::int64_t,
     return {hn::GatherIndex(d, table.wide(), index.v)};
 }
 
-/// The two halves of 32-bit words, unsigned.
+/// The lower and the upper halves of 32-bit words, unsigned.
 template <KnownRescales K, class V>
 HWY_INLINE std::array<Lanes<std::int32_t, K>, 2> halves_of(V both) {
     const hn::ScalableTag<std::int32_t> d;
@@ -43,8 +43,8 @@ HWY_INLINE std::array<Lanes<std::int32_t, K>, 2> halves_of(V both) {
             Lanes<std::int32_t, K>{hn::BitCast(d, hn::ShiftRight<16>(hn::BitCast(du, both)))}};
 }
 
-/// Sixteen bytes at each lane's own address, as four vectors: word w of lane i's bytes is lane i of vector w.
-/// One load a lane where a gather takes four.  Address: from a lane's number to a pointer.
+/// Loads sixteen bytes at an address for each lane and transposes them into four vectors: word w of lane i
+/// becomes lane i of vector w.  This is one load a lane where gathers take four.
 template <class Load>
 HWY_INLINE std::array<hn::Vec<hn::ScalableTag<std::int32_t>>, 4> transposed_blocks(Load&& load) {
     const hn::ScalableTag<std::int32_t> d;
@@ -54,7 +54,7 @@ HWY_INLINE std::array<hn::Vec<hn::ScalableTag<std::int32_t>>, 4> transposed_bloc
     return {hn::Set(d, words[0]), hn::Set(d, words[1]), hn::Set(d, words[2]), hn::Set(d, words[3])};
 #else
     constexpr int kBlocks = static_cast<int>(HWY_LANES(std::int32_t)) / 4;
-    const auto block = [&](int j) {  // of lanes j, 4 + j, 8 + j, 12 + j
+    const auto block = [&](int j) {  // for lanes j, 4 + j, 8 + j, 12 + j
         if constexpr (kBlocks == 1) {
             return load(j);
         } else if constexpr (kBlocks == 2) {
@@ -76,7 +76,7 @@ HWY_INLINE std::array<hn::Vec<hn::ScalableTag<std::int32_t>>, 4> transposed_bloc
             words(hn::InterleaveUpper(d64, ab_upper, ce_upper))};
 #endif
 }
-/// Sixteen bytes at address(lane).
+/// The same for sixteen bytes at address(lane), a pointer.
 template <class Address>
 HWY_INLINE auto load_quads(Address&& address) {
 #if HWY_TARGET == HWY_SCALAR
@@ -87,7 +87,7 @@ HWY_INLINE auto load_quads(Address&& address) {
         [&](int lane) { return hn::LoadU(d, reinterpret_cast<const std::int32_t*>(address(lane))); });
 #endif
 }
-/// Eight bytes at address(lane), each widened to 16 bits.
+/// The same for eight bytes at address(lane), each widened to 16 bits.
 template <class Address>
 HWY_INLINE auto load_widened_quads(Address&& address) {
 #if HWY_TARGET == HWY_SCALAR
@@ -103,7 +103,7 @@ HWY_INLINE auto load_widened_quads(Address&& address) {
     });
 #endif
 }
-/// Two neighbours of four unsigned 16-bit words each at base + 8 position bytes.
+/// Two neighbouring nodes of four unsigned 16-bit words each, at base + 8 position bytes.
 template <KnownRescales K>
 HWY_INLINE std::array<std::array<Lanes<std::int32_t, K>, 4>, 2> load_neighbours(
     const void* base, Lanes<std::int32_t, K> position) {
@@ -116,33 +116,33 @@ HWY_INLINE std::array<std::array<Lanes<std::int32_t, K>, 4>, 2> load_neighbours(
                third = halves_of<K>(words[2]), fourth = halves_of<K>(words[3]);
     return {{{first[0], first[1], second[0], second[1]}, {third[0], third[1], fourth[0], fourth[1]}}};
 }
-/// Of four 16-bit words as two pairs: the middle two.
+/// The middle two of four 16-bit words that come as two pairs.
 template <class V>
 HWY_INLINE V inner_pair(V lower, V upper) {
     const hn::ScalableTag<std::int32_t> d;
     const hn::RebindToUnsigned<decltype(d)> du;
     return hn::Or(hn::BitCast(d, hn::ShiftRight<16>(hn::BitCast(du, lower))), hn::ShiftLeft<16>(upper));
 }
-/// Pairs of unsigned 16-bit words as the signed ones that blend_pairs multiplies: less 2^15 each, unless all
-/// are below that.
+/// Turns pairs of unsigned 16-bit words into the signed ones that blend_pairs multiplies: subtracts 2^15 from
+/// each, unless all are below that.
 template <bool kBelow15Bits>
 HWY_INLINE auto signed_pairs(hn::Vec<hn::ScalableTag<std::int32_t>> pairs) {
     if constexpr (kBelow15Bits) return pairs;
     return hn::Xor(pairs, hn::Set(hn::ScalableTag<std::int32_t>(), static_cast<std::int32_t>(0x80008000)));
 }
-/// 1 - w in the low half, w in the high one; at most 14 bits of fraction.
+/// Packs 1 - w into the low half and w into the high half; at most 14 fraction bits.
 HWY_INLINE auto pair_weights(hn::Vec<hn::ScalableTag<std::int32_t>> weight, int weight_bits) {
     const hn::ScalableTag<std::int32_t> d;
     return hn::Or(hn::Sub(hn::Set(d, 1 << weight_bits), weight), hn::ShiftLeft<16>(weight));
 }
-/// Blends of packed signed pairs (low half: weight 0) plus `offset`, quantised.
+/// Blends packed signed pairs (the low half has weight 1 - w), adds `offset` and quantises.
 template <KnownRescales K>
 HWY_INLINE Lanes<std::int32_t, K> blend_pairs(hn::Vec<hn::ScalableTag<std::int32_t>> pairs,
                                               hn::Vec<hn::ScalableTag<std::int32_t>> weights,
                                               std::int32_t offset, const Rescale& to) {
     const hn::ScalableTag<std::int32_t> d;
 #if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR
-    // Highway's operation is x86's pairwise one here: one instruction for both products and their sum.
+    // On x86, Highway's operation is one instruction for both products and their sum.
     const hn::ScalableTag<std::int16_t> d16;
     auto unused = hn::Zero(d);
     const auto sum = [&](std::int32_t start) {
@@ -159,7 +159,7 @@ HWY_INLINE Lanes<std::int32_t, K> blend_pairs(hn::Vec<hn::ScalableTag<std::int32
         return {shift_right_same(sum(offset + static_cast<std::int32_t>(to.bias)), to.shift)};
     return quantise(Lanes<std::int32_t, K>{sum(offset)}, to);
 }
-/// Rows `row` and `row + 1` of four words each.
+/// Rows `row` and `row + 1` of a table with four columns.
 template <KnownRescales K>
 HWY_INLINE std::array<std::array<Lanes<std::int32_t, K>, 4>, 2> load_two_rows(const std::int32_t* rows,
                                                                               Lanes<std::int32_t, K> row) {
@@ -171,7 +171,7 @@ HWY_INLINE std::array<std::array<Lanes<std::int32_t, K>, 4>, 2> load_two_rows(co
     const auto b = load_quads([&](int lane) { return rows + std::int64_t{4} * at[lane] + 4; });
     return {{{L{a[0]}, L{a[1]}, L{a[2]}, L{a[3]}}, {L{b[0]}, L{b[1]}, L{b[2]}, L{b[3]}}}};
 }
-/// lerp_rows of rows that are paired (Table::paired), their weights of 14 bits at most.
+/// lerp_rows for paired rows (Table::paired) and weights of at most 14 bits.
 template <KnownRescales K>
 HWY_INLINE std::array<Lanes<std::int32_t, K>, 4> lerp_paired_rows(const std::int32_t* paired,
                                                                   Lanes<std::int32_t, K> row,
@@ -179,7 +179,7 @@ HWY_INLINE std::array<Lanes<std::int32_t, K>, 4> lerp_paired_rows(const std::int
                                                                   int weight_bits, const Rescale& to_color,
                                                                   const Rescale& to_alpha) {
     const hn::ScalableTag<std::int32_t> d;
-    alignas(64) std::int32_t at[HWY_LANES(std::int32_t)];  // bytes
+    alignas(64) std::int32_t at[HWY_LANES(std::int32_t)];  // byte offsets
     hn::Store(hn::ShiftLeft<4>(row.v), d, at);
     const auto* bytes = reinterpret_cast<const std::uint8_t*>(paired);
     const auto pairs = load_quads([&](int lane) { return bytes + at[lane]; });
@@ -206,7 +206,7 @@ HWY_INLINE std::array<Lanes<T, K>, 4> lerp_rows(const Table& table, Lanes<T, K> 
     return {between(0), between(1), between(2), between(3)};
 }
 
-/// Cells of 16-bit words are two 32-bit words, or one of 64 bits, with the first channel lowest.
+/// A node of four 16-bit words is two 32-bit words, or one of 64 bits; the first channel is lowest.
 template <KnownRescales K>
 HWY_INLINE std::array<Lanes<std::int32_t, K>, 4> gather_cell(const CellTable& table,
                                                              Lanes<std::int32_t, K> row,

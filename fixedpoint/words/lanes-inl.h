@@ -1,8 +1,8 @@
-// The word of the fast path: as many samples side by side as a vector register holds.  All vector types and
-// target code live here; compiled once per SIMD target (Highway's foreach_target).  Only + - * / sqrt that
-// IEEE 754 rounds exactly are used in floating point, and every quotient and root is corrected in integers:
-// the same bits as the model's on every CPU.  Here: words and their arithmetic; lane_tables-inl.h and
-// lane_quotients-inl.h are what kernels include besides.
+// The word of the fast path: as many samples side by side as a vector register holds.  Compiled once per
+// SIMD target (Highway's foreach_target).  In floating point it uses only + - * / and sqrt, which IEEE 754
+// rounds exactly, and corrects every quotient and root in integers: it has the model's bits on every CPU.
+// This file has words and their arithmetic; kernels also include lane_tables-inl.h and
+// lane_quotients-inl.h.
 //
 //   Lanes<int32_t>   products and sums of 32 bits
 //   Lanes<int64_t>   factors of 32 bits, products and sums of 64
@@ -25,7 +25,7 @@ HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// K: what is known of every Rescale the word meets when its kernel is compiled (fixedpoint/quantise.h).
+/// K: what the kernel is compiled to assume about every Rescale that the word meets (fixedpoint/quantise.h).
 template <class T, KnownRescales K = KnownRescales::nothing>
 struct Lanes {
     using Element = T;
@@ -41,7 +41,7 @@ struct LaneMask {
     M m;
 };
 
-/// words.h's constant, compiled for the target.
+/// constant() of words.h, compiled for the target.
 template <class W>
 HWY_INLINE W constant(std::int64_t value) {
     return make_word(WordTag<W>{}, value);
@@ -62,7 +62,7 @@ template <KnownRescales K>
 HWY_INLINE Lanes<std::int32_t, K> operator*(Lanes<std::int32_t, K> a, Lanes<std::int32_t, K> b) {
     return {hn::Mul(a.v, b.v)};
 }
-/// Factors of 32 bits each, sign included.
+/// Both factors must fit 32 bits, sign included.
 template <KnownRescales K>
 HWY_INLINE Lanes<std::int64_t, K> operator*(Lanes<std::int64_t, K> a, Lanes<std::int64_t, K> b) {
     const hn::ScalableTag<std::int32_t> d32;
@@ -113,8 +113,8 @@ HWY_INLINE Lanes<T, K> absolute(Lanes<T, K> x) {
     if constexpr (sizeof(T) == 4) return {hn::Abs(x.v)};
     return {hn::Max(x.v, hn::Sub(hn::Zero(hn::ScalableTag<T>()), x.v))};
 }
-/// One count for all lanes.  x86 shifts by a vector of counts in one instruction where it has one for the
-/// type, and by one count in two.
+/// Shifts all lanes by one count.  Where x86 can shift by a vector of counts, that is one instruction; a
+/// shift by a single count is two.
 template <class V>
 HWY_INLINE V shift_left_same(V v, int bits) {
 #if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2
@@ -141,7 +141,7 @@ template <class T, KnownRescales K>
 HWY_INLINE Lanes<T, K> floor_shift(Lanes<T, K> x, int bits) {
     return {shift_right_same(x.v, bits)};
 }
-/// x - floor(x 2^-bits) 2^bits.
+/// The lowest bits: x - floor(x 2^-bits) 2^bits.
 template <class T, KnownRescales K>
 HWY_INLINE Lanes<T, K> fraction_bits(Lanes<T, K> x, int bits) {
     return {hn::And(x.v, hn::Set(hn::ScalableTag<T>(), static_cast<T>((T{1} << bits) - 1)))};
@@ -159,15 +159,15 @@ HWY_INLINE Lanes<T, K> within(Lanes<T, K> x, std::int64_t, std::int64_t) {
     return x;
 }
 
-/// A format's limit as lanes can hold it: one beyond them is never met, for results fit the lanes.
+/// A format's limit, cut to what a lane holds.  A limit outside is never met, for results fit the lanes.
 template <class T, KnownRescales K>
 HWY_INLINE Lanes<T, K> limit_in_lanes(std::int64_t limit) {
-    // By value: a reference to one of three keeps compilers from taking it out of a loop.
+    // Returns a value: a reference to one of three keeps compilers from moving it out of loops.
     constexpr std::int64_t kLow = std::numeric_limits<T>::min(), kHigh = std::numeric_limits<T>::max();
     return make_word(WordTag<Lanes<T, K>>{}, limit < kLow ? kLow : limit > kHigh ? kHigh : limit);
 }
 
-/// quantise.h's formula.  What K does not tell is asked of `to`, in every vector.
+/// The formula of quantise.h.  What K does not assume is read from `to`, for every vector.
 template <class T, KnownRescales K>
 HWY_INLINE Lanes<T, K> quantise(Lanes<T, K> x, const Rescale& to) {
     const hn::ScalableTag<T> d;
@@ -176,7 +176,7 @@ HWY_INLINE Lanes<T, K> quantise(Lanes<T, K> x, const Rescale& to) {
     if constexpr (K == KnownRescales::halves_to_even || K == KnownRescales::unit_products) {
         if (to.shift > 0) {
 #if HWY_TARGET <= HWY_AVX3
-            // Halves up; what was a half loses the last bit: one instruction less where masks are cheap.
+            // Rounds halves up, then clears the last bit of what was a half: saves an instruction with masks.
             const auto sum = hn::Add(x.v, hn::Set(d, static_cast<T>(to.bias + to.to_even)));
             const auto rest = hn::Set(d, static_cast<T>((T{1} << to.shift) - 1));
             const auto half = hn::Eq(hn::And(sum, rest), hn::Zero(d));
@@ -193,7 +193,7 @@ HWY_INLINE Lanes<T, K> quantise(Lanes<T, K> x, const Rescale& to) {
     if (to.shift <= 0) {
         x = shift_left(x, -to.shift);
     } else if (to.shift >= static_cast<int>(8 * sizeof(T))) {
-        // Truncation alone: the sign is left.  A bias as wide would have asked for wider lanes.
+        // Only trn comes here, and leaves the sign; a bias as wide would have asked for wider lanes.
         x = floor_shift(x, static_cast<int>(8 * sizeof(T)) - 1);
     } else {
         auto sum = biased();
@@ -211,12 +211,12 @@ HWY_INLINE Lanes<T, K> quantise(Lanes<T, K> x, const Rescale& to) {
     return {hn::And(x.v, hn::Set(d, static_cast<T>((std::int64_t{1} << to.width) - 1)))};
 }
 
-/// words.h's.
+/// quantised_product() of words.h.
 template <class T, KnownRescales K>
 HWY_INLINE Lanes<T, K> quantised_product(Lanes<T, K> a, Lanes<T, K> b, const Rescale& to) {
     return quantise(a * b, to);
 }
-/// Of numbers from 0 to 1: in 16 bits, where both stand below zero, for -1 is there and 1 is not.
+/// For factors from 0 to 1, in 16 bits.  Both are negated first, because -1 exists there and 1 does not.
 template <KnownRescales K>
 requires(K == KnownRescales::unit_products) HWY_INLINE Lanes<std::int32_t, K> quantised_product(
     Lanes<std::int32_t, K> a, Lanes<std::int32_t, K> b, const Rescale& to) {
@@ -226,9 +226,9 @@ requires(K == KnownRescales::unit_products) HWY_INLINE Lanes<std::int32_t, K> qu
     const hn::ScalableTag<std::int16_t> d16;
     const auto narrow = [&](auto v) HWY_ATTR { return hn::BitCast(d16, v); };
     const auto below = [&](auto v) HWY_ATTR { return hn::Sub(hn::Zero(d16), narrow(v)); };
-    // Halves up, and 1 comes out as -2^15: the upper half of each word stays zero.
+    // Rounds halves up.  A result of 1 comes out as -2^15, with a zero upper half: it is 1 as 32 bits.
     const auto up = hn::BitCast(d, hn::MulFixedPoint15(below(a.v), below(b.v)));
-    // What was a half loses the last bit.
+    // Clears the last bit of what was a half.
     const auto lost = hn::And(hn::BitCast(d, hn::Mul(narrow(a.v), narrow(b.v))), hn::Set(d, 0x7fff));
     const auto half = hn::Eq(lost, hn::Set(d, 0x4000));
     return {hn::IfThenElse(half, hn::AndNot(hn::Set(d, 1), up), up)};
@@ -237,10 +237,10 @@ requires(K == KnownRescales::unit_products) HWY_INLINE Lanes<std::int32_t, K> qu
 #endif
 }
 
-// ----------------------------------------------------------------------------------------- memory:
-// always 32-bit words
+// ------------------------------------------------------------------------------------------ memory
+// Words between stages, which lie in buffers
 
-/// Wires pass between stages in buffers of 32-bit words, whatever the lanes a stage runs in.
+/// Wires pass between stages in buffers of 32-bit words, whatever the width of a stage's lanes.
 template <KnownRescales K>
 HWY_INLINE Lanes<std::int32_t, K> load(WordTag<Lanes<std::int32_t, K>>, const std::int32_t* from) {
     return {hn::LoadU(hn::ScalableTag<std::int32_t>(), from)};
@@ -267,7 +267,7 @@ template <class L>
 HWY_INLINE L load(const std::int32_t* from) {
     return load(WordTag<L>{}, from);
 }
-/// Of whole numbers, which lie there as integers for every word.
+/// Loads integers, which lie in the buffers as integers for every word.
 template <class T, KnownRescales K>
 HWY_INLINE Lanes<T, K> load_whole(WordTag<Lanes<T, K>> tag, const std::int32_t* from) {
     return load(tag, from);
@@ -280,7 +280,7 @@ template <class L>
 HWY_INLINE L load_whole(const std::int32_t* from) {
     return load_whole(WordTag<L>{}, from);
 }
-/// The lower or the upper 16 bits of words as they lie there: one of two voxels.
+/// The lower or the upper 16 bits of 32-bit words in a buffer: one of two voxels.
 template <class T, KnownRescales K>
 HWY_INLINE Lanes<T, K> half_of(Lanes<T, K> both, bool upper) {
     return {hn::And(upper ? hn::ShiftRight<16>(both.v) : both.v, hn::Set(hn::ScalableTag<T>(), T{0xffff}))};

@@ -1,4 +1,4 @@
-// Interval arithmetic on words: proves how wide a stage's exact results are.
+// Interval arithmetic: it proves how wide the exact results of a stage are.
 #include "fixedpoint/words/range.h"
 
 namespace squint {
@@ -9,7 +9,7 @@ thread_local std::uint64_t Range::used = 0;
 
 namespace {
 
-constexpr Int128 kFar = Int128{1} << 126;  // stands for anything wider than 127 bits
+constexpr Int128 kFar = Int128{1} << 126;  // stands for all that is wider than 127 bits
 Int128 cap(Int128 x) {
     return x > kFar ? kFar : x < -kFar ? -kFar : x;
 }
@@ -43,7 +43,7 @@ Range noted(Range result) {
     return result;
 }
 namespace {
-// A result on the way to a smaller one: in lanes it may wrap and come back.
+// A result on the way to a smaller one: lanes may let it wrap, because the smaller one comes out right.
 void noted_in_passing(Int128 low, Int128 high) {
     Range::needs.result_bits = std::max(Range::needs.result_bits, signed_bits({cap(low), cap(high)}));
 }
@@ -110,7 +110,7 @@ Range shift_by(Range x, Range bits) {
         return by >= 0 ? product(value, Int128{1} << std::min<Int128>(by, 120))
                        : value >> std::min<Int128>(-by, 120);
     };
-    // Its callers know the result to be smaller, and say so with within().
+    // The callers know that the result is smaller, and say so with within().
     const Range all =
         spanning({at(x.low, bits.low), at(x.low, bits.high), at(x.high, bits.low), at(x.high, bits.high)});
     noted_in_passing(all.low, all.high);
@@ -146,7 +146,7 @@ Range quotient(Range numerator, Range denominator, const Rescale& to) {
                  largest = std::max<Int128>(denominator.high, 1);
     noted_in_passing(0, scaled_high);
     noted({0, 4 * largest});
-    // Lanes estimate in floating point: 22 bits of result from 32-bit lanes, 48 from 64-bit ones.  They
+    // Lanes estimate in floating point: results of 22 bits in 32-bit lanes, of 48 in 64-bit ones.  They
     // saturate only.
     const int lanes = to.wraps || to.width > 48 ? 65 : to.width > 22 ? 33 : 0;
     Range::needs.lane_bits = std::max(Range::needs.lane_bits, lanes);
@@ -195,7 +195,7 @@ Range quotient(WideRange numerator, WideRange denominator, const Rescale& to) {
     const int lanes_before = Range::needs.lane_bits;
     const Range q = quotient(numerator.range, denominator.range, to);
     Range::needs.lane_bits = std::max(lanes_before, to.wraps || to.width > 31 ? 65 : 0);
-    // The product of either half of a result with the denominator.
+    // The product of one half of a result with the denominator.
     noted_as_wide(0, product(std::max<Int128>(denominator.range.high, 1), Int128{1} << (to.width / 2 + 2)));
     return q;
 }

@@ -1,4 +1,4 @@
-// Intervals: what a stage's exact results can reach, and so how wide a word it needs (pipeline/plan/ranges.cpp).
+// Intervals: bounds of a stage's exact results, and so the width of its words (pipeline/plan/ranges.cpp).
 #pragma once
 
 #include "fixedpoint/words/word.h"
@@ -8,12 +8,12 @@
 
 namespace squint {
 
-/// How wide a stage's numbers get.
+/// How wide the numbers of a stage get, in bits.
 struct WordNeeds {
     int wide_bits = 0;     // the widest number of a Wide<W>, sign included
-    int operand_bits = 0;  // the widest factor of a multiplication, sign included
+    int operand_bits = 0;  // the widest factor of a product, sign included
     int result_bits = 0;   // the widest exact result, sign included
-    int lane_bits = 0;     // the same where numbers may wrap on the way to a result that fits: lanes do
+    int lane_bits = 0;     // as result_bits, but results on the way to a smaller one may wrap
     void merge(const WordNeeds& other) {
         operand_bits = std::max(operand_bits, other.operand_bits);
         result_bits = std::max(result_bits, other.result_bits);
@@ -22,17 +22,17 @@ struct WordNeeds {
     }
 };
 
-/// Every value an expression can take: lowest and highest.  Operations note their widths in `needs`.
+/// All values that an expression can take, lowest and highest.  Operations note their widths in `needs`.
 struct Range {
     Int128 low = 0, high = 0;
     static thread_local WordNeeds needs;
     static thread_local std::uint64_t limited;  // bit w: wire w can saturate or wrap
-    static thread_local std::uint64_t used;     // bit w: something passes wire w, or is read from its table
+    static thread_local std::uint64_t used;     // bit w: a value passes wire w or is read from its table
 };
 inline void note_wire(WordTag<Range>, int wire) {
     if (wire >= 0) Range::used |= std::uint64_t{1} << wire;
 }
-/// A comparison of ranges: both answers are looked at.
+/// A comparison of ranges: both outcomes are followed.
 struct Perhaps {
     friend constexpr Perhaps operator&(Perhaps, Perhaps) { return {}; }
     friend constexpr Perhaps operator|(Perhaps, Perhaps) { return {}; }

@@ -1,4 +1,4 @@
-// Numbers that are not rounded: raw units in floating point, where shifts are exact multiplications.
+// Numbers without rounding: raw units in floating point, where a shift is an exact multiplication.
 #pragma once
 
 #include "fixedpoint/audit.h"
@@ -10,8 +10,8 @@
 
 namespace squint {
 
-/// A real number in raw units (value * 2^F of its wire): no rounding but where a wire's Rescale is active,
-/// which is how one stage alone is put into fixed point.
+/// A real number in raw units (value * 2^F of its wire).  It rounds only where a wire's Rescale is active: so
+/// one stage alone is put into fixed point.
 template <class T>
 struct Real {
     using IsReal = void;
@@ -59,7 +59,7 @@ template <class T>
 Real<T> square_root(Real<T> x) {
     return {std::sqrt(x.v)};
 }
-/// 2^x of whole numbers, -127 < x < 128.
+/// 2^x of an integer, -127 < x < 128.
 template <class T>
 Real<T> whole_power_of_two(Real<T> x) {
     return {power_of_two<T>(static_cast<int>(x.v))};
@@ -93,7 +93,7 @@ template <class T>
 constexpr Real<T> within(Real<T> x, std::int64_t, std::int64_t) {
     return x;
 }
-/// Of whole numbers.
+/// The number of bits of an integer; 0 for 0.
 template <class T>
 Real<T> bit_length(Real<T> x) {
     int bits = 0;
@@ -104,7 +104,7 @@ template <class T>
 Real<T> shift_by(Real<T> x, Real<T> bits) {
     return {std::floor(x.v * power_of_two<T>(static_cast<int>(bits.v)))};
 }
-/// For traces: a wire's value without its rounding.
+/// For traces: records a wire's value without rounding it.
 template <class T>
 Real<T> traced(Real<T> value, const Rescale& to) {
     if (to.statistics && to.statistics->trace) {

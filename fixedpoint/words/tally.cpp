@@ -50,7 +50,7 @@ int most_spare(const Tally& a, const Tally& b) {
 bool both_constant(const Tally& a, const Tally& b) {
     return a.is_constant && b.is_constant;
 }
-// Shifts, signs and nothing at all.
+// Free: shifts and signs.
 bool is_power_of_two(const Tally& x) {
     const Int128 size = absolute(x.proven.low);
     return (size & (size - 1)) == 0;
@@ -68,7 +68,7 @@ void note_lookup(int width) {
     if (!Tally::bill) return;
     ++Tally::bill->lookups, Tally::bill->lookup_bits += width;
 }
-// A word of a table: as wide as its wire's format.
+// A word of a table is as wide as its wire's format.
 Tally looked_up(const Range& proven, int wire) {
     const Tally word = with_width(proven, wire >= 0 ? Tally::wires[static_cast<std::size_t>(wire)] : 0);
     note_lookup(word.width());
@@ -114,7 +114,7 @@ Tally absolute(const Tally& x) {
     return {absolute(x.proven), x.spare, x.is_constant};
 }
 Tally select(Perhaps, const Tally& yes, const Tally& no) {
-    // As wide as the wider of the two: spare bits are spare of each one's own range.
+    // As wide as the wider one: the spare bits of each belong to its own range.
     return with_width(select(Perhaps{}, yes.proven, no.proven), std::max(yes.width(), no.width()));
 }
 Tally gather(const Table& table, const Tally& row, int column) {

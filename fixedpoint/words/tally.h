@@ -1,10 +1,10 @@
-// A word that counts what hardware must hold to compute what a stage computes: multipliers, dividers, roundings
-// and look-ups, by the widths of their operands.  Comparisons are Perhaps: every branch is taken, so that a run
-// is the dearest path.
+// A word that counts the operations of a stage as hardware: multipliers, dividers, roundings and look-ups, by
+// the widths of their operands.  Both outcomes of a comparison are followed (Perhaps), so that a run counts
+// the dearest path.
 //
-// Widths: a value on a wire has its format's width.  A sum or a difference has the width that its proven range
-// asks, plus the bits that its wires have to spare beyond what was proven of them.  What a limit or a meaning
-// (min, within) narrows has no bits to spare.  The sign counts where a value can be negative.
+// Widths: a value on a wire has the width of its format.  A sum or a difference has the width of its proven
+// range, plus the bits by which the formats of its wires exceed what was proven of them.  A value narrowed by
+// a limit or a promise (min, within) has no such spare bits.  The sign counts where a value can be negative.
 #pragma once
 
 #include "fixedpoint/cell_table.h"
@@ -17,13 +17,13 @@
 
 namespace squint {
 
-/// Operations, counted by widths.
+/// Numbers of operations, by widths.
 struct Bill {
-    using Widths = std::pair<int, int>;          // the greater first; of a divider quotient and divisor
+    using Widths = std::pair<int, int>;          // the greater first; a divider's: quotient, divisor
     std::map<Widths, std::int64_t> multipliers;  // both factors vary
     std::map<Widths, std::int64_t>
         constant_multipliers;                   // one factor, or the divisor, is a constant of the plan
-    std::map<Widths, std::int64_t> dividers;    // square roots too: of their result's width
+    std::map<Widths, std::int64_t> dividers;    // square roots too, by the width of the root
     std::map<int, std::int64_t> roundings;      // other than trn, by the result's width
     std::int64_t lookups = 0, lookup_bits = 0;  // words read from tables
 
@@ -37,9 +37,9 @@ struct Bill {
 };
 
 struct Tally {
-    Range proven;              // every value it can have
+    Range proven;              // all values that it can have
     int spare = 0;             // bits of its wires beyond those that `proven` needs
-    bool is_constant = false;  // of the plan
+    bool is_constant = false;  // a constant of the plan
 
     int width() const;
 

@@ -1,5 +1,5 @@
-// What a stage may use of a number.  A stage is written once over a Word; which one decides what runs.  Each
-// word's file ends with the assertion that it is one.
+// What a stage may do with a number.  A stage is written once, over a Word, and runs in any of them.  The
+// file of each word ends with the assertion that it is one.
 #pragma once
 
 #include "fixedpoint/words/integer.h"
@@ -8,13 +8,13 @@
 
 namespace squint {
 
-/// Real<T> and lanes of floats: no rounding but where a wire's Rescale is active.
+/// Real<T> and lanes of floats: they round only where a wire's Rescale is active.
 template <class W>
 concept RealWord = requires {
     typename W::IsReal;
 };
 
-/// A number, or as many side by side as a vector holds.
+/// One number, or as many side by side as a vector holds.
 template <class W>
 concept Word = requires(W x, int bits, std::int64_t raw, const Table& table, const Rescale& to) {
     { constant<W>(raw) } -> std::same_as<W>;
@@ -23,8 +23,8 @@ concept Word = requires(W x, int bits, std::int64_t raw, const Table& table, con
     requires std::same_as<decltype(x * x), W>;
     x == x;
     x < x;
-    any(x < x);                                   // whether it holds for any of them
-    { select(x < x, x, x) } -> std::same_as<W>;   // each its own choice
+    any(x < x);                                   // whether it holds in any lane
+    { select(x < x, x, x) } -> std::same_as<W>;   // lane by lane
     { shift_left(x, bits) } -> std::same_as<W>;   // x 2^bits
     { floor_shift(x, bits) } -> std::same_as<W>;  // floor(x 2^-bits)
     { shift_by(x, x) } -> std::same_as<W>;        // x 2^y for y of either sign
@@ -32,22 +32,22 @@ concept Word = requires(W x, int bits, std::int64_t raw, const Table& table, con
     { max(x, x) } -> std::same_as<W>;
     { absolute(x) } -> std::same_as<W>;
     { bit_length(x) } -> std::same_as<W>;              // of |x|: 0 for 0
-    { gather(table, x, bits) } -> std::same_as<W>;     // the words of a column
+    { gather(table, x, bits) } -> std::same_as<W>;     // one column of a row of a table
     { blend(x, x, x, bits) } -> std::same_as<W>;       // v0 + w (v1 - v0), exact
-    { affine(x, x, x, raw, raw) } -> std::same_as<W>;  // p + k v, known to lie in a range
-    { within(x, raw, raw) } -> std::same_as<W>;        // x, known to lie in a range
+    { affine(x, x, x, raw, raw) } -> std::same_as<W>;  // p + k v, promised to lie in [raw, raw]
+    { within(x, raw, raw) } -> std::same_as<W>;        // x, promised to lie in [raw, raw]
     { quantise(x, to) } -> std::same_as<W>;            // the one place where bits are lost
     { quotient(x, x, to) } -> std::same_as<W>;         // exact, then quantised once
     requires RealWord<W> || requires(const std::array<W, 3>& v) {
-        { vector_length(v, bits) } -> std::same_as<W>;  // floor(|v| 2^bits), for the normal in integers
+        { vector_length(v, bits) } -> std::same_as<W>;  // floor(|v| 2^bits), for normals
     };
 };
 
 // ------------------------------------------------------------------------------------ wide numbers
 
-/// A few numbers of a stage may need more bits than all others: differences of sums, which a quotient makes
-/// small again.  A Wide<W> holds them next to W: it is W itself where W is wide enough for anything; lanes of
-/// 32 bits take doubles, exact up to 53 bits.
+/// A few numbers of a stage need more bits than all others: differences of sums, which a quotient makes small
+/// again.  A Wide<W> holds them.  It is W itself where W is wide enough; for lanes of 32 bits it is two
+/// doubles, exact to 53 bits.
 ///
 ///   widen  wide_sum  wide_product  -  shift_left  absolute  max  quotient
 template <class W>
@@ -69,7 +69,7 @@ template <class W>
 constexpr W wide_product(W a, W b) {
     return a * b;
 }
-/// Whether any of the numbers side by side is above zero.
+/// Whether any lane is above zero.
 template <class N>
 constexpr bool any_positive(const N& x) {
     return any(constant<N>(0) < x);
@@ -77,14 +77,14 @@ constexpr bool any_positive(const N& x) {
 
 // ---------------------------------------------------------------------------------- for every word
 
-/// Quotients by one denominator.
+/// Three quotients with one denominator.
 template <class W>
 constexpr std::array<W, 3> quotients(const std::array<W, 3>& numerators, W denominator, const Rescale& to) {
     return {quotient(numerators[0], denominator, to), quotient(numerators[1], denominator, to),
             quotient(numerators[2], denominator, to)};
 }
 
-/// a b, exact, then quantised once.
+/// a b, computed exactly and quantised once.
 template <class W>
 constexpr W quantised_product(W a, W b, const Rescale& to) {
     return quantise(a * b, to);
