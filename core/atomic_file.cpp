@@ -20,8 +20,8 @@
 namespace squint {
 namespace {
 
-// Temporaries now being written, readable from a signal handler: fixed storage, and a flag set last and
-// cleared first.
+// Temporaries that are being written.  A signal handler reads them: the storage is fixed, and a flag is set
+// last and cleared first.
 constexpr int kSlots = 64;
 struct Slot {
     std::atomic<bool> taken{false}, live{false};
@@ -38,7 +38,7 @@ std::counting_semaphore<kSlots> free_slots{kSlots};
     refuse(path, std::strerror(error));
 }
 
-/// A file of its own beside `target` for as long as it lives; registered for remove_temporaries.
+/// Owns a temporary file beside `target`, registered for remove_temporaries.
 class Temporary {
   public:
     Temporary(const std::string& named, const std::filesystem::path& target) {
@@ -57,7 +57,7 @@ class Temporary {
     Temporary& operator=(const Temporary&) = delete;
 
     const char* path() const { return slot_->path; }
-    /// Its bytes reach the disk before its name does: a loss of power leaves the old file or the new one.
+    /// Syncs the bytes before the name changes: a loss of power leaves the old file or the new one.
     int rename_to(const std::filesystem::path& target) {
         if (const int error = sync()) return error;
         if (std::rename(path(), target.c_str()) != 0) return errno;
@@ -66,7 +66,7 @@ class Temporary {
     }
 
   private:
-    /// The name says nothing of the target but its extension, so a long file name stays within the limit.
+    /// The name takes only the target's extension, so that a long name stays within the limit.
     int create(const std::filesystem::path& target) {
         static std::atomic<unsigned> count{0};
         for (;;) {
@@ -75,7 +75,7 @@ class Temporary {
             const std::string full = (target.parent_path() / name).string();
             if (full.size() >= sizeof slot_->path) return ENAMETOOLONG;
             std::memcpy(slot_->path, full.c_str(), full.size() + 1);
-            slot_->live = true;  // before the file is there: a signal right after open() must know of it
+            slot_->live = true;  // set before the file exists: a signal right after open() must find it
             const int file = open(slot_->path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
             if (file >= 0) return close(file), 0;
             slot_->live = false;
@@ -98,8 +98,8 @@ class Temporary {
     Slot* slot_;
 };
 
-/// Writers know only the temporary's name and often not the reason: put the target's name and a full disk
-/// into their message.
+/// Adds the target's name, and a full disk, to a writer's message: writers know only the temporary's name and
+/// often not the reason.
 std::string explained(std::string message, const std::string& temporary, const std::string& path) {
     for (std::size_t at; (at = message.find(temporary)) != std::string::npos;)
         message.replace(at, temporary.size(), path);
@@ -112,7 +112,7 @@ std::string explained(std::string message, const std::string& temporary, const s
     return message;
 }
 
-int write_bytes(int file, std::string_view bytes) {  // 0 or an error's number
+int write_bytes(int file, std::string_view bytes) {  // 0 or an error number
     while (!bytes.empty()) {
         const ssize_t written = ::write(file, bytes.data(), bytes.size());
         if (written < 0 && errno != EINTR) return errno;
@@ -132,8 +132,8 @@ void write_whole(const std::string& path, const std::function<void(const std::st
     // A device or a pipe must not be replaced by a file.
     if (fs::exists(status) && !fs::is_regular_file(status)) return write(path);
 
-    // Through a link to its file: the link stays.  Absolute, so that a change of folder meanwhile does no
-    // harm.
+    // Writes through a link to its file, so that the link stays; absolute, in case the working folder changes
+    // meanwhile.
     const fs::path target = fs::exists(status) ? fs::canonical(path, ignored) : fs::absolute(path, ignored);
     if (target.empty()) refuse(path, ignored.message());
     if (!target.has_filename()) refuse(path, EISDIR);

@@ -15,13 +15,13 @@ namespace squint {
 namespace {
 
 constexpr double kPi = 0x1.921fb54442d18p+1;
-constexpr double kParallel = 1e-6;  // sine of the angle below which two directions count as parallel
+constexpr double kParallel = 1e-6;  // sine of the angle below which directions count as parallel
 
 struct SinCos {
     double sin, cos;
 };
 
-/// Exact at multiples of 90 degrees, so that axis-aligned views have axis-aligned rays.
+/// Sine and cosine, exact at multiples of 90 degrees: axis-aligned views get axis-aligned rays.
 SinCos sin_cos_degrees(double degrees) {
     const double turn = std::fmod(degrees, 360.0);  // exact
     const double quarter = std::floor(turn / 90 + 0.5);
@@ -84,14 +84,14 @@ void check(const CameraSettings& settings, int width, int height) {
         throw InputError(fmt::format("image: {} x {} pixels, allowed is 1 x 1 or more", width, height));
 }
 
-/// Distance from center to the farthest corner of the volume: a ball that no turn leaves.
+/// The distance from center to the farthest corner of the volume: every turn stays within that ball.
 double framing_radius(const Volume& volume, const Vec3& center) {
     const Vec3 low = volume.box_low() - center, high = volume.box_high() - center;
     const Vec3 farthest(std::max(std::fabs(low.x), std::fabs(high.x)),
                         std::max(std::fabs(low.y), std::fabs(high.y)),
                         std::max(std::fabs(low.z), std::fabs(high.z)));
     return std::max(length(farthest),
-                    volume.smallest_spacing());  // a volume of one voxel still has a picture
+                    volume.smallest_spacing());  // a volume of one voxel has a picture, too
 }
 
 }  // namespace

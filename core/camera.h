@@ -10,7 +10,7 @@ namespace squint {
 
 enum class Projection { orthographic, perspective };
 
-/// What a scene says of the camera.  Absent values are chosen so that the whole volume is in the picture.
+/// A scene's camera settings.  Those that are absent are chosen so that the picture shows the whole volume.
 struct CameraSettings {
     Projection projection = Projection::orthographic;
     std::optional<Vec3> eye;       // overrides azimuth and elevation
@@ -28,7 +28,7 @@ struct Ray {
     Vec3 direction;  // unit length
 };
 
-/// A camera with nothing left open.  ray() uses + - * / sqrt only: same bits everywhere.
+/// A camera with all settings decided.  ray() uses only + - * / and sqrt: the same bits on every CPU.
 struct Camera {
     Projection projection = Projection::orthographic;
     Vec3 eye, center;
@@ -39,12 +39,12 @@ struct Camera {
     Ray ray(int column, int row) const;  // through the pixel's centre; row 0 is the top
 };
 
-/// Throws InputError: eye equals center, up parallel to the view, height or fov_y out of range.
+/// Throws InputError: eye equals center, up is parallel to the view, height or fov_y is out of range.
 Camera make_camera(const CameraSettings& settings, const Volume& volume, int width, int height,
                    int frame = 0);
 
-/// The part of a ray inside a box [low, high], as distances along it: empty when first >= last (a chord of
-/// zero is empty).
+/// The part of a ray inside a box [low, high], as distances along the ray.  It is empty when first >= last; a
+/// chord of length zero is empty.
 struct Interval {
     double first = 0, last = 0;
     bool empty() const { return !(first < last); }

@@ -39,7 +39,7 @@ Vec3 rgb_from_lab(const Vec3& lab) {
     const double x = kWhite.x * cube(fy + lab.y / 500), y = cube(fy), z = kWhite.z * cube(fy - lab.z / 200);
     Vec3 c(3.2406 * x - 1.5372 * y - 0.4986 * z, -0.9689 * x + 1.8758 * y + 0.0415 * z,
            0.0557 * x - 0.2040 * y + 1.0570 * z);
-    // As VTK does with what no display shows: brighter than white is scaled down, darker than black cut off.
+    // Outside the display's range as VTK does: scales down what is brighter than white, cuts off below 0.
     Vec3 rgb;
     for (int i = 0; i < 3; ++i) rgb[i] = c[i] > 0 ? srgb_from_linear(c[i]) : 0;
     return rgb / std::max({rgb.x, rgb.y, rgb.z, 1.0});
@@ -58,7 +58,7 @@ Vec3 hsv_from_rgb(const Vec3& c) {
 }
 
 Vec3 rgb_from_hsv(const Vec3& hsv) {
-    const auto part = [&](double from_red) {  // 0 at the hue, 1 two sixths away and beyond
+    const auto part = [&](double from_red) {  // 0 at the hue; 1 from two sixths away on
         const double sixths = hsv.x * 6 + from_red, turn = sixths - 6 * std::floor(sixths / 6);
         return std::clamp(std::min(turn, 4 - turn), 0.0, 1.0);
     };
@@ -107,7 +107,7 @@ Vec3 lab_from_msh(const Msh& c) {
     return {c.m * portable::cos(c.s), across * portable::cos(c.h), across * portable::sin(c.h)};
 }
 
-/// The hue of an unsaturated colour of magnitude `m` beside `c`, for which no hue is its own.
+/// The hue given to an unsaturated colour of magnitude `m` beside `c`: it has none of its own.
 double hue_beside(const Msh& c, double m) {
     if (c.m >= m - 0.1) return c.h;
     const double spin = c.s * std::sqrt(m * m - c.m * c.m) / (c.m * portable::sin(c.s));

@@ -44,7 +44,7 @@ std::string names(const Image& image) {
     return all;
 }
 
-/// Sums of a - b over pixels, one or more channels at a time.
+/// Sums of a - b over pixels, for one channel or several.
 struct Sums {
     std::int64_t count = 0;
     double sum = 0, squares = 0, largest = 0;
@@ -56,7 +56,7 @@ struct Sums {
     }
 };
 
-/// Rows are summed by themselves, so that rounding grows with width + height and not with their product.
+/// Sums each row apart, so that rounding grows with width + height, not with their product.
 Sums differences(std::span<const double> a, std::span<const double> b, std::span<const std::uint8_t> chosen,
                  int width) {
     Sums all;
@@ -101,8 +101,8 @@ std::array<double, kWindow> gaussian() {
     return weight;
 }
 
-/// Gaussian means over every whole window of the picture, row by row: separable, with the inner loops along
-/// x.
+/// Gaussian means over every whole window of the picture, row by row.  The filter is separable, and the inner
+/// loops run along x.
 class Blur {
   public:
     Blur(int width, int height)
@@ -197,7 +197,7 @@ void check_same_shape(const Image& a, const Image& b) {
         }
 }
 
-/// An EXR of NaN must never pass for a picture.
+/// Throws for a value that is not finite: a picture of NaN must never pass.
 void check_finite(const Image& image, const char* which) {
     for (const Channel& channel : image.channels) {
         const auto bad = [](float value) { return !std::isfinite(value); };
@@ -211,7 +211,7 @@ void check_finite(const Image& image, const char* which) {
     }
 }
 
-/// Pixels with A > 0 in either image; all of them where there is no A.
+/// Pixels with A > 0 in either image; all pixels where there is no A.
 std::vector<std::uint8_t> foreground_of(const Image& a, const Image& b, std::size_t pixels) {
     std::vector<std::uint8_t> chosen(pixels);
     const Channel *alpha_a = a.find("A"), *alpha_b = b.find("A");

@@ -1,5 +1,5 @@
-// Errors that a user can mend: a file, a flag or a scene that cannot be used.  Everything else is a bug
-// (assert).
+// Errors that a user can mend: a file, a flag or a scene that cannot be used.  All other errors are bugs, for
+// assert.
 #pragma once
 
 #include <stdexcept>

@@ -14,8 +14,8 @@ namespace squint {
 namespace {
 
 constexpr std::uint32_t kMagic = 20000630;
-constexpr std::uint32_t kMultiPart = 0x1000;        // a bit of the version
-constexpr std::uint64_t kMostPixelsPerByte = 1032;  // deflate makes at most as many bytes of one
+constexpr std::uint32_t kMultiPart = 0x1000;        // a bit of the version field
+constexpr std::uint64_t kMostPixelsPerByte = 1032;  // deflate makes at most 1032 bytes of one
 constexpr std::uint64_t kFewPixels = 1 << 22;       // that any file may claim
 constexpr std::uint64_t kMostLinesPerChunk =
     256;  // of every compression; each chunk has an offset of 8 bytes

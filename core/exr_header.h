@@ -1,4 +1,4 @@
-// The header of an OpenEXR file, looked through before a library takes its word for sizes.
+// Checks the header of an OpenEXR file before a library allocates what it claims.
 #pragma once
 
 #include <cstddef>
@@ -6,9 +6,9 @@
 
 namespace squint {
 
-/// Throws InputError where an attribute reaches past the end of the file, or the pixels that the header claims are
-/// more than its bytes can hold: a library would ask for that memory first.  Bytes that are no EXR are left to the
-/// reader.  Layout: OpenEXR, "OpenEXR File Layout".
+/// Throws InputError where an attribute reaches past the end of the file, or the header claims more pixels
+/// than its bytes can hold: a library would ask for that memory first.  Accepts bytes that are no EXR: the
+/// reader refuses them.  Layout: OpenEXR, "OpenEXR File Layout".
 void check_exr_header(const unsigned char* bytes, std::size_t size, const std::string& path);
 
 }  // namespace squint

@@ -1,5 +1,5 @@
-// MurmurHash3's 128-bit mixing (A. Appleby, public domain): bytes -> 32 hex digits.  About 5 GB/s on one
-// core.
+// MurmurHash3's 128-bit mixing (A. Appleby, public domain): bytes -> 32 hex digits.  One core hashes about 5
+// GB/s.
 #include "core/hash.h"
 
 #include <fmt/format.h>
@@ -37,9 +37,9 @@ std::uint64_t avalanche(std::uint64_t x) {
 
 }  // namespace
 
-// A call ends on a block boundary (the rest is padded with zeros): what was fed in two calls hashes unlike
-// the same bytes in one, unless the first call's size is a multiple of 16.  The total length goes into the
-// result.
+// Each call pads its bytes with zeros to whole blocks: the same bytes hash differently in two calls
+// and in one, unless the first call's size is a multiple of 16.  The total length goes into the
+// hash.
 void Hasher::bytes(const void* data, std::size_t size) {
     const auto* at = static_cast<const unsigned char*>(data);
     State state{a_, b_};

@@ -1,4 +1,4 @@
-// A content hash for naming data and pictures: not for security.
+// A hash of contents, to name data and pictures.  Not for security.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace squint {
 
-/// 128 bits, the same on every machine.
+/// A hash of 128 bits, the same on every machine.
 class Hasher {
   public:
     void bytes(const void* data, std::size_t size);

@@ -21,7 +21,7 @@ namespace squint {
 namespace {
 
 constexpr const char* kNoTime =
-    "1970:01:01 00:00:00";  // OpenImageIO stamps the present time where there is none
+    "1970:01:01 00:00:00";  // OpenImageIO adds the present time where none is given
 
 std::size_t pixels(const Image& image) {
     return static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
@@ -31,13 +31,13 @@ Channel& add(Image& image, std::string name) {
     return image.channels.emplace_back(Channel{std::move(name), {}, {}});
 }
 
-/// Whole or not at all.
+/// Writes bytes whole or not at all.
 void write(const pictures::Packed& picture, const std::string& path) {
     write_text_whole(path, pictures::codec().encode(picture, path));
 }
 
-/// Every channel holds one value a pixel, and there is a pixel: promises of the caller, checked where a file
-/// would tell.
+/// The caller promises one value a pixel in every channel, and at least one pixel; checked here, because a
+/// file would show it otherwise.
 void check_shape(const Image& image, const std::string& path) {
     if (image.width < 1 || image.height < 1 || image.channels.empty())
         throw InputError(fmt::format("{}: {} x {} pixels of {} channels, allowed is 1 or more of each", path,
@@ -48,8 +48,8 @@ void check_shape(const Image& image, const std::string& path) {
                                          image.width, image.height));
 }
 
-/// 8-bit sRGB of linear light, half a step rounded up: the number of codes whose lower edge is reached.  NaN
-/// is black.
+/// The 8-bit sRGB code of linear light, rounded to nearest: the number of codes whose lower edge it reaches.
+/// NaN gives 0.
 class Encoder {
   public:
     Encoder() {
@@ -68,9 +68,9 @@ class Encoder {
     }
 
   private:
-    static constexpr int kBuckets = 1024;  // of [0, 1]: at most a few edges in each
+    static constexpr int kBuckets = 1024;  // over [0, 1]: each holds a few edges at most
     std::array<double, 255> edge_{};
-    std::array<std::uint8_t, kBuckets + 1> first_{};  // code at a bucket's lower end
+    std::array<std::uint8_t, kBuckets + 1> first_{};  // the code at a bucket's lower end
 };
 
 }  // namespace
@@ -151,7 +151,7 @@ Image preview_of(const Image& image, const double background[3]) {
 }
 
 namespace {
-/// In a format of OpenImageIO's, with a setting of its encoder.
+/// Encodes an image in a format of OpenImageIO, with one setting of its encoder.
 void write_8bit(const char* format, const std::pair<std::string, int>& setting, const Image& image,
                 const std::string& path, const double background[3]) {
     const std::vector<std::uint8_t> packed = preview_codes(image, path, background);
@@ -188,7 +188,7 @@ Image read_image(const std::string& path, Attributes* attributes) {
 }
 
 const pictures::Codec& pictures::codec() {
-    // Looked for where the program's (or the library's) run path says; kept until the process ends.
+    // Searched where the run path of the program or the library says; stays loaded until the process ends.
     static const Codec& loaded = []() -> const Codec& {
         void* const module = dlopen(kFile, RTLD_LAZY | RTLD_LOCAL);
         void* const symbol = module ? dlsym(module, kSymbol) : nullptr;

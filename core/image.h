@@ -19,8 +19,8 @@ struct Channel {
 struct Image {
     int width = 0, height = 0;
     std::vector<Channel> channels;
-    int left = 0, top = 0;    // where its first pixel stands: the data window of an EXR that was read
-    bool is_display = false;  // codes for a display, as read from an 8-bit file
+    int left = 0, top = 0;    // position of the first pixel: the data window of an EXR that was read
+    bool is_display = false;  // holds display codes, as read from an 8-bit file
 
     Channel* find(const std::string& name);
     const Channel* find(const std::string& name) const;
@@ -28,24 +28,24 @@ struct Image {
     Channel& add_words(std::string name);
 };
 
-/// Strings only: OpenImageIO drops arrays of integers silently.
+/// Strings alone: OpenImageIO silently drops arrays of integers.
 using Attributes = std::map<std::string, std::string>;
 
-/// Writes through a temporary beside `path`, renamed into place: whole or not at all.  No time, host or path
-/// in the file.
+/// Writes an OpenEXR file, whole or not at all (write_whole).  It holds no time, host or
+/// path.
 void write_exr(const Image& image, const std::string& path, const Attributes& attributes);
 
-/// R G B A premultiplied linear -> over `background` (linear) -> 8-bit sRGB PNG.  Written whole or not at
-/// all. `level`: 1 is quick, 9 small.
+/// Composites R G B A (premultiplied, linear) over `background` (linear) and writes an 8-bit sRGB PNG, whole
+/// or not at all.  `level`: 1 compresses quickly, 9 to the smallest file.
 void write_preview_png(const Image& image, const std::string& path, const double background[3],
                        int level = 6);
 
-/// What write_preview_png() writes, as read_image() reads it back: R G B, codes over 255.
+/// The picture of write_preview_png(), as read_image() would read it: R G B, codes over 255.
 Image preview_of(const Image& image, const double background[3]);
 
-/// EXR, PNG and whatever else OpenImageIO opens by its extension.  Floats as stored, 8-bit codes as 0 to 1
-/// without decoding; UINT channels of EXR as words.  Channels come in the order of the reader: find them by
-/// name.  One picture a file: a second part of an EXR is refused.  Throws InputError.
+/// Reads EXR, PNG and every other format that OpenImageIO opens by its extension.  Floats stay as stored,
+/// 8-bit codes become 0 to 1 undecoded, UINT channels of EXR become words.  Find channels by name: the order
+/// is the reader's.  Throws InputError; an EXR of several parts is refused.
 Image read_image(const std::string& path, Attributes* attributes = nullptr);
 
 }  // namespace squint

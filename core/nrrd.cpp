@@ -1,4 +1,4 @@
-// NRRD: the header is read with teem, the data are ours to take.
+// Reads NRRD: teem parses the header, and we read the data.
 #include "core/nrrd.h"
 
 #include "core/atomic_file.h"
@@ -27,8 +27,7 @@ constexpr const char* kScaleKey = "squint value scale";
 constexpr const char* kOffsetKey = "squint value offset";
 constexpr const char* kBitsKey = "squint scalar bits";
 
-// --- The header's text
-// -----------------------------------------------------------------------------------------------------
+// --- The header's text ---------------------------------------------------------------------------------
 
 struct HeaderText {
     std::string text;       // without the line that names the data file
@@ -88,10 +87,9 @@ void check_version(const std::string& path, const HeaderText& header) {
                                  path, printable(version.substr(0, 16))));
 }
 
-// --- teem
-// ------------------------------------------------------------------------------------------------------------------
+// --- teem --------------------------------------------------------------------------------------------------
 
-/// teem keeps its errors in one place for all threads.
+/// teem keeps its errors in one place, shared by all threads.
 std::mutex& teem_lock() {
     static std::mutex lock;
     return lock;
@@ -110,8 +108,8 @@ struct Parsed {
     bool seen(int field) const { return io->seen[field] != 0; }
 };
 
-/// biff's message has a line for every caller, the deepest and most telling last: that one, and what was
-/// being parsed.
+/// The telling part of biff's message, which has a line for every caller: the last and deepest line, and what
+/// was being parsed.
 std::string one_line(std::string text) {
     std::vector<std::string> lines;
     for (std::size_t start = 0; start < text.size();) {
@@ -140,8 +138,7 @@ void parse(const std::string& path, const HeaderText& header, Parsed& parsed) {
     throw InputError(fmt::format("{}: NRRD header: {}", path, line));
 }
 
-// --- What the header says
-// --------------------------------------------------------------------------------------------------
+// --- What the header says ------------------------------------------------------------------------------
 
 void take_type(StoredVolume& stored, const Parsed& parsed) {
     constexpr std::pair<int, StoredType> kTypes[] = {
@@ -164,7 +161,7 @@ void take_type(StoredVolume& stored, const Parsed& parsed) {
     stored.big_endian = parsed.io->endian == airEndianBig;
 }
 
-/// The axis that holds no space: of several numbers a voxel, or of times.  -1: none.
+/// The axis that is not one of space: components of a voxel, or points in time; -1: none.
 int axis_of_components(const StoredVolume& stored, const Parsed& parsed) {
     const Nrrd& nrrd = *parsed.nrrd;
     if (nrrd.dim == 3) return -1;
@@ -179,10 +176,10 @@ int axis_of_components(const StoredVolume& stored, const Parsed& parsed) {
         if (no_direction || (kind != nrrdKindUnknown && kind != nrrdKindDomain && kind != nrrdKindSpace))
             return axis;
     }
-    return nrrd.axis[0].size <= 4 ? 0 : 3;  // nothing says which: a few numbers a voxel, or else times
+    return nrrd.axis[0].size <= 4 ? 0 : 3;  // not stated: few numbers are components, else times
 }
 
-/// The file's axes of space, in order.
+/// The axes of space, in the file's order.
 std::array<int, 3> axes_of_space(const StoredVolume& stored, const Parsed& parsed) {
     const int without = axis_of_components(stored, parsed);
     std::array<int, 3> axes{0, 1, 2};
@@ -208,7 +205,7 @@ void take_dims(StoredVolume& stored, const Parsed& parsed) {
     take_components(stored, size_of(components), run);
 }
 
-/// Axes from `space directions`: each along a world axis, in any order and either sense.
+/// Reads axes from `space directions`: each along a world axis, in any order and either sense.
 void take_directions(StoredVolume& stored, const Nrrd& nrrd, const std::array<int, 3>& axes) {
     if (nrrd.spaceDim != 3)
         throw InputError(
@@ -221,8 +218,8 @@ void take_directions(StoredVolume& stored, const Nrrd& nrrd, const std::array<in
     take_axes(stored);
 }
 
-/// What `axis mins` and `axis maxs` say of an axis: a voxel is between two cell faces, or on two nodes; cells
-/// where the file does not say, as teem has it.
+/// What `axis mins` and `axis maxs` bound: cells, whose voxels lie between two faces, or nodes, whose voxels
+/// lie on both ends.  Without a statement it is cells, as in teem.
 double spacing_between_ends(const std::string& where, const NrrdAxisInfo& info, int axis) {
     if (!AIR_EXISTS(info.min) || !std::isfinite(info.max - info.min) || !(info.min < info.max))
         throw InputError(
@@ -236,7 +233,7 @@ double spacing_between_ends(const std::string& where, const NrrdAxisInfo& info, 
     return (info.max - info.min) / voxels;
 }
 
-/// Axes from `spacings`, `axis mins` and `axis maxs`, in the file's order.
+/// Reads axes from `spacings`, `axis mins` and `axis maxs`, in the file's order.
 void take_spacings(StoredVolume& stored, const Parsed& parsed, const std::array<int, 3>& axes) {
     const bool given = parsed.seen(nrrdField_spacings);
     for (int axis = 0; axis < 3; ++axis) {
@@ -276,7 +273,7 @@ void take_geometry(StoredVolume& stored, const Parsed& parsed, std::vector<std::
             fmt::format("{}: its space is left-handed; pictures show its mirror image", stored.where));
 }
 
-/// Units and bits that save_nrrd kept.
+/// Reads the units and bits that save_nrrd stored.
 void take_values(StoredVolume& stored, const Parsed& parsed) {
     const auto number = [&](const char* key) -> std::optional<double> {
         char* text = nrrdKeyValueGet(parsed.nrrd, key);
@@ -298,8 +295,7 @@ void take_values(StoredVolume& stored, const Parsed& parsed) {
     }
 }
 
-// --- Data
-// ------------------------------------------------------------------------------------------------------------------
+// --- Data --------------------------------------------------------------------------------------------------
 
 std::size_t skip_lines(const MappedFile& file, std::size_t offset, unsigned lines, const std::string& where) {
     for (; lines > 0; --lines) {
@@ -331,7 +327,7 @@ void take_data(StoredVolume& stored, const Parsed& parsed, const MappedFile& fil
                                      parsed.io->encoding->name));
     if (skip < -1) throw InputError(fmt::format("{}: byte skip is {}, but must be -1 or more", where, skip));
     if (skip == -1 && file.size - offset >= stored.size())
-        return take_mapped(stored, file, file.size - stored.size(), where);  // at the end
+        return take_mapped(stored, file, file.size - stored.size(), where);  // at the file's end
     const std::size_t bytes = skip > 0 ? static_cast<std::size_t>(skip) : 0;
     take_mapped(stored, file, bytes < file.size - offset ? offset + bytes : file.size, where);
 }
@@ -377,8 +373,8 @@ void save_nrrd(const Volume& volume, const std::string& path) {
         volume.type == ScalarType::u8 ? "uchar" : "ushort", volume.dims.x, volume.dims.y, volume.dims.z, s.x,
         s.y, s.z, o.x, o.y, o.z, kScaleKey, volume.value_scale, kOffsetKey, volume.value_offset, kBitsKey,
         volume.scalar_bits);
-    // A comment fills the header up: voxels that begin at a multiple of 64 can be mapped and used where they
-    // lie.
+    // A comment pads the header: voxels that begin at a multiple of 64 can be mapped and used in
+    // place.
     const std::size_t with_comment = header.size() + 3;
     header += "#" + std::string((64 - with_comment % 64) % 64, ' ') + "\n\n";
     const std::size_t bytes = static_cast<std::size_t>(volume.voxels()) * volume.scalar_bytes();

@@ -106,7 +106,7 @@ double polynomial(const std::array<double, N>& coefficient, double x) {
     return even + x * odd;
 }
 
-/// e^r - 1 for |r| <= 0.35: the first term left out is r^15 / 15!, below 2^-60 of r.
+/// e^r - 1 for |r| <= 0.35.  The first term left out is r^15 / 15!, below 2^-60 of r.
 double expm1_near_zero(double r) {
     return r + r * r * (0.5 + r * polynomial(kFactorials, r));
 }
@@ -126,7 +126,7 @@ LogReduction reduce_log(double x) {
     return {k, m};
 }
 
-/// ln x to about 2^-66 of itself: ln m = 2 s (1 + z/3 + z^2/5 + ...) with s = (m - 1) / (m + 1), z = s^2.
+/// ln x to about 2^-66 relative: ln m = 2 s (1 + z/3 + z^2/5 + ...) with s = (m - 1) / (m + 1), z = s^2.
 Double2 log_twice(double x) {
     const auto [k, m] = reduce_log(x);
     constexpr Double2 kThird{0x1.5555555555555p-2, 0x1.5555555555555p-56};
@@ -150,7 +150,7 @@ Turn reduce_turn(double x) {
     return {k & 3, r.high, r.low};
 }
 
-/// sin(r + low): Taylor to r^19; what is left out is r^21 / 21!, below 2^-70 of r.
+/// sin(r + low): Taylor series to r^19.  The first term left out is r^21 / 21!, below 2^-70 of r.
 double sin_near_zero(double r, double low) {
     const double z = r * r;
     double series = 0;
@@ -159,7 +159,7 @@ double sin_near_zero(double r, double low) {
     return r + (low * (1 - 0.5 * z) - r * z * ((1 + series) / 6));
 }
 
-/// cos(r + low): Taylor to r^20.
+/// cos(r + low): Taylor series to r^20.
 double cos_near_zero(double r, double low) {
     const double z = r * r;
     double series = 0;

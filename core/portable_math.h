@@ -1,5 +1,5 @@
-// exp, log, pow, sin, cos and friends with the same bits on every CPU: only + - * / sqrt, compiled with
-// -ffp-contract=off. libm's differ in the last bit with the CPU's features (docs/conventions.md#numbers).
+// exp, log, pow, sin, cos ... with the same bits on every CPU: only + - * / sqrt, and -ffp-contract=off.
+// Those of libm differ in the last bit between CPUs (docs/conventions.md#numbers).
 #pragma once
 
 #include <span>
@@ -15,8 +15,8 @@ double sin(double x);                      // |x| < 1e6
 double cos(double x);
 double tan(double x);
 
-/// Of many numbers, as many at once as the CPU has lanes: bit for bit what each alone gives.  `result` is as
-/// long as `x` and may be the same numbers.
+/// The same for many numbers, with SIMD, bit for bit as for each alone.  `result` is as long as `x`, and may
+/// be the same memory.
 void expm1_each(std::span<const double> x, std::span<double> result);
 void log1p_each(std::span<const double> x, std::span<double> result);
 

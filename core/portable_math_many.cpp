@@ -1,5 +1,5 @@
-// expm1 and log1p of many numbers: the operations of portable_math.cpp in their order, in vectors.  An
-// operation on doubles rounds alike in a vector and alone, so the bits are the same on every target.
+// expm1 and log1p of many numbers: the operations of portable_math.cpp, in their order, on vectors.  A
+// vector's operation on doubles rounds like a single one, so the bits are the same on every target.
 #include "core/portable_math.h"
 #include "core/portable_math_series.h"
 
@@ -25,7 +25,7 @@ constexpr hn::RebindToUnsigned<Tag> kBits;
 V constant(double value) {
     return hn::Set(kTag, value);
 }
-V plus_product(V a, V b, V c) {  // two roundings on every target
+V plus_product(V a, V b, V c) {  // rounds twice on every target
     return hn::Add(a, hn::Mul(b, c));
 }
 
@@ -51,7 +51,7 @@ struct Expm1 {
         const V r = hn::Sub(hn::Sub(x, hn::Mul(k, constant(kLn2High))), hn::Mul(k, constant(kLn2Low)));
         const V p =
             plus_product(r, hn::Mul(r, r), hn::Add(constant(0.5), hn::Mul(r, polynomial(kFactorials, r))));
-        // 2^k: k + 1023 stands in the lowest bits of the sum.
+        // 2^k: the lowest bits of the sum are k + 1023.
         const V sum = hn::Add(k, constant(0x1.8p52 + 1023));
         const V power = hn::BitCast(kTag, hn::ShiftLeft<52>(hn::BitCast(kBits, sum)));
         const V result = hn::Add(hn::Mul(power, p), hn::Sub(power, constant(1)));
@@ -65,7 +65,7 @@ struct Log1p {
     static double of_one(double x) { return log1p(x); }
     static V of(V x) {
         const V u = hn::Add(constant(1), x), lost = hn::Sub(x, hn::Sub(u, constant(1)));
-        // u = 2^k m; the exponent as a number: in the lowest bits of 2^52.
+        // u = 2^k m.  The exponent becomes a number in the lowest bits of 2^52.
         const auto bits = hn::BitCast(kBits, u);
         const auto exponent = hn::Or(hn::ShiftRight<52>(bits), hn::Set(kBits, 0x4330000000000000u));
         V k = hn::Sub(hn::BitCast(kTag, exponent), constant(0x1p52 + 1023));

@@ -1,4 +1,4 @@
-// The numbers that exp and log are made of, for one argument and for many.
+// Constants of exp and log, shared by the functions of one argument and of many.
 #pragma once
 
 #include <array>

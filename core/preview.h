@@ -1,4 +1,4 @@
-// Pictures for looking at.
+// Writes pictures to look at.
 #pragma once
 
 #include "core/image.h"
@@ -7,8 +7,8 @@
 
 namespace squint {
 
-/// What write_preview_png() writes, as PNG, or as JPEG where the name ends in .jpg or .jpeg.  The file appears whole or
-/// not at all.  Throws InputError.
+/// Writes the picture of write_preview_png() as PNG, or as JPEG where the name ends in .jpg or .jpeg: whole
+/// or not at all.  Throws InputError.
 void write_preview(const Image& image, const std::string& path, const double background[3]);
 
 }  // namespace squint

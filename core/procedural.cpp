@@ -1,5 +1,5 @@
-// Procedural volumes: scalar fields over the unit cube, written once over a number type.  With doubles a
-// field gives its value, with dual numbers its exact gradient as well.
+// Procedural volumes: scalar fields over the unit cube, written once over a number type.  Doubles give a
+// field's value, dual numbers its exact gradient as well.
 #include "core/procedural.h"
 
 #include "core/error.h"
@@ -54,7 +54,7 @@ double sin(double x) {
 double cos(double x) {
     return portable::cos(x);
 }
-/// At 0 the slope is taken as 0: every field here that meets it depends on the square alone.
+/// At 0 the slope counts as 0: each field here that meets it depends on the square alone.
 Dual sqrt(const Dual& x) {
     const double root = std::sqrt(x.value);
     return {root, root > 0 ? x.slope * (0.5 / root) : Vec3(0)};
@@ -78,8 +78,7 @@ S squared_length(const Point<S>& p) {
     return p.x * p.x + p.y * p.y + p.z * p.z;
 }
 
-// --- Shapes: distances to a surface, negative inside, exact near it to first order
-// ---------------------------------------
+// --- Shapes: distances to a surface, negative inside, exact near it to first order -------------------------
 
 /// 0 below 0, 1 above 1, between them 6 t^5 - 15 t^4 + 10 t^3: two continuous derivatives.
 template <class S>
@@ -119,8 +118,8 @@ S ellipsoid(const Point<S>& p, const Vec3& center, const Vec3& radii) {
         return S(-std::min(radii.x, std::min(radii.y, radii.z)));  // 0 / 0 at the centre
     return length * (length - S(1)) / sqrt(squared_length(scaled / radii));
 }
-/// Where ellipsoid() is certainly above `above` or below `-below`, without its roots and divisions: it is (|k| - 1)
-/// times a length that is at least the least radius.
+/// Where ellipsoid() is certainly above `above` or below `-below`, found without its roots and divisions: it
+/// is (|k| - 1) times a length of at least the smallest radius.
 class EllipsoidBounds {
   public:
     EllipsoidBounds(const Vec3& center, const Vec3& radii, double above, double below)
@@ -142,7 +141,7 @@ class EllipsoidBounds {
     double outer_, inner_;  // of squared |k|
 };
 
-/// A tube from a to b whose radius goes from ra to rb, with round ends.
+/// A tube with round ends from a to b; its radius changes from ra to rb.
 template <class S>
 S tube(const Point<S>& p, const Vec3& a, double ra, const Vec3& b, double rb) {
     const Vec3 axis = b - a;
@@ -154,19 +153,18 @@ S tube(const Point<S>& p, const Vec3& a, double ra, const Vec3& b, double rb) {
     return sqrt(squared_length(off)) - (S(ra) + along * S(rb - ra));
 }
 
-// --- The phantom: a head, x to its left, y to its back, z up; coordinates -1 to 1
-// ----------------------------------------
+// --- The phantom: a head, x to its left, y to its back, z up; coordinates -1 to 1 --------------------------
 
 struct Segment {
     Vec3 a;
     double ra;
     Vec3 b;
     double rb;
-    // Farther than `reach` from the middle it reaches no surface: spare its square roots.
+    // Beyond `reach` from the middle the head has no surface: skip the square roots.
     Vec3 middle = (a + b) * 0.5;
     double reach = (b - a).length() * 0.5 + ra + 0.1;
 };
-/// Vessels of one half of the brain: a trunk, a ring around the middle, and branches that thin out.
+/// The vessels of one half of the brain: a trunk, a ring around the middle, and branches that get thinner.
 constexpr int kSegments = 31;
 const std::array<Segment, kSegments>& vessel_tree() {
     static const std::array<Segment, kSegments> tree{{
@@ -262,13 +260,13 @@ S skull_outside(const Point<S>& p) {
     return cut(join(join(skull, jaw, 0.02), spine, 0.04), canal, 0.02);
 }
 
-/// Levels rise inwards, air < skin < tissue < bone < brain < vessel, and every surface parts two neighbours:
-/// a transfer function that shows one of them does not meet it again in the transition between two others.
+/// Levels rise inwards, air < skin < tissue < bone < brain < vessel, and each surface separates two
+/// neighbours: a transfer function that shows one level does not meet it again between two others.
 constexpr double kSkin = 0.16, kTissue = 0.32, kBone = 0.55, kBrain = 0.72, kVessel = 0.94;
 constexpr double kEdge = 0.030;  // of 2: transitions are 2 voxels wide at 128, 4 at 256
 
-/// Most voxels lie where head_surface() need not be known, only that it is beyond kEdge, or below -0.06, where skin and
-/// flesh are whole.  A join lies below both its parts, at most by a quarter of its blend, a cut as much above.
+/// Most voxels only need to know that head_surface() is beyond kEdge or below -0.06, where skin and flesh are
+/// whole.  A join lies below both parts by at most a quarter of its blend, a cut above by as much.
 enum class Head { outside, near_the_surface, inside };
 Head part_of_head(const Vec3& p) {
     constexpr double kOut = kEdge + (0.20 + 0.20 + 0.06 + 0.05) / 4, kIn = 0.06 + (0.05 + 0.03) / 4 + 1e-3;
@@ -281,7 +279,7 @@ Head part_of_head(const Vec3& p) {
     const Vec3 half(std::fabs(p.x), p.y, p.z);
     if (cranium.below(p)) return eye.above(half) && mouth.above(p) ? Head::inside : Head::near_the_surface;
     if (!cranium.above(p) || !face.above(p) || !ear.above(half)) return Head::near_the_surface;
-    // The nose is within a ball about its middle, the neck within a cylinder below its upper end.
+    // The nose lies within a ball about its middle, the neck within a cylinder below its upper end.
     const Vec3 nose = p - Vec3(0, -0.76, -0.16);
     constexpr double kNose = 0.09 + 0.07 + kOut, kNeck = 0.36 + kOut;
     const double beside = p.y - std::clamp(p.y, 0.14, 0.20);
@@ -314,8 +312,7 @@ S phantom(const S& x, const S& y, const S& z) {
     return value + inside(vessels(p), kEdge) * S(kVessel - kBrain);
 }
 
-// --- The other fields
-// ----------------------------------------------------------------------------------------------------
+// --- The other fields --------------------------------------------------------------------------------------
 
 /// 1 at the centre, 0 at the distance 0.5 and beyond.
 template <class S>
@@ -333,7 +330,7 @@ S marschner_lobb(const S& x, const S& y, const S& z) {
     return (S(1) - sin(pz * S(kPi / 2)) + (S(1) + ripple) * S(kAlpha)) / S(2 * (1 + kAlpha));
 }
 
-/// Five nested shells, brighter and thinner inwards, empty between: (1 - t^2)^3 across a shell.
+/// Five nested shells, brighter and thinner inwards, with gaps between: (1 - t^2)^3 across a shell.
 template <class S>
 S shells(const S& x, const S& y, const S& z) {
     constexpr double kRadius[] = {0.44, 0.36, 0.28, 0.20, 0.12},
@@ -361,8 +358,8 @@ S fog(const S&, const S&, const S&) {
     return S(1.0 / 255);
 }
 
-/// (T(x) + T(y) + T(z) + 3) / 6 over [-1, 1]^3 with the cubic T(t) = 4 t^3 - 3 t: isosurfaces open, close and
-/// split.
+/// (T(x) + T(y) + T(z) + 3) / 6 over [-1, 1]^3 with the cubic T(t) = 4 t^3 - 3 t: its isosurfaces open, close
+/// and split.
 template <class S>
 S polynomial(const S& x, const S& y, const S& z) {
     const auto cubic = [](const S& unit) {
@@ -417,7 +414,7 @@ const ProceduralField* find_procedural(std::string_view name) {
 
 namespace {
 
-/// The coordinate of a voxel centre in [0, 1]; the only voxel of an axis stands in the middle.
+/// The coordinate of a voxel centre in [0, 1]; the only voxel of an axis lies at 0.5.
 double unit_coordinate(std::int64_t index, std::int64_t size) {
     return size == 1 ? 0.5 : static_cast<double>(index) / static_cast<double>(size - 1);
 }

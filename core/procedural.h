@@ -1,4 +1,4 @@
-// Procedural volumes: each an exact scalar field with an exact gradient, sampled and rounded to levels.
+// Procedural volumes: exact scalar fields with exact gradients, sampled and rounded to levels.
 #pragma once
 
 #include "core/vector.h"
@@ -12,7 +12,7 @@
 
 namespace squint {
 
-/// A scalar field over the unit cube [0,1]^3, with values in [0,1] of full scale.
+/// A scalar field over the unit cube [0,1]^3.  Its values are in [0,1] of full scale.
 struct ProceduralField {
     std::string name;
     std::string description;                    // one line for help
@@ -22,12 +22,12 @@ struct ProceduralField {
     std::function<Vec3(const Vec3&)> gradient;  // exact derivative of `value`
 };
 
-/// phantom, sphere, marschner_lobb, shells, ramp, constant, fog, polynomial.
+/// All fields: phantom, sphere, marschner_lobb, shells, ramp, constant, fog, polynomial.
 const std::vector<ProceduralField>& procedural_fields();
 const ProceduralField* find_procedural(std::string_view name);  // null if unknown
 
-/// Scalars round(value * (2^bits - 1)) at voxel centres (x / (dims.x - 1), ...).  Uses only portable
-/// arithmetic: same bits everywhere.
+/// Samples a field at the voxel centres (x / (dims.x - 1), ...): scalars round(value * (2^bits - 1)).  Uses
+/// portable arithmetic alone: the same bits on every CPU.
 Volume make_procedural(const ProceduralField& field, Index3 dims, int bits, const Vec3& spacing = {1, 1, 1});
 
 }  // namespace squint

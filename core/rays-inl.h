@@ -1,5 +1,5 @@
-// Rays of a camera and their way through a box, over a real word D: doubles one by one, or as many side by
-// side as a vector register holds.  + - * / sqrt and comparisons alone: the same bits on every CPU.
+// Rays of a camera and their chords through a box, over a real word D: single doubles, or as many as a vector
+// holds.  Uses only + - * / sqrt and comparisons: the same bits on every CPU.
 #if defined(SQUINT_CORE_RAYS_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SQUINT_CORE_RAYS_INL_H
 #undef SQUINT_CORE_RAYS_INL_H
@@ -32,7 +32,7 @@ HWY_INLINE double ceiling(double x) {
     return std::ceil(x);
 }
 
-/// Doubles side by side.
+/// Doubles side by side, as a vector.
 struct Reals {
     using D = hwy::HWY_NAMESPACE::ScalableTag<double>;
     using V = hwy::HWY_NAMESPACE::Vec<D>;
@@ -82,7 +82,7 @@ HWY_INLINE Reals ceiling(Reals x) {
     return Reals(hwy::HWY_NAMESPACE::Ceil(x.v));
 }
 
-/// What many numbers are divided by.  By a power of two that is a multiplication, with the same result.
+/// A divisor of many numbers.  Division by a power of two becomes a multiplication, with the same result.
 struct Divisor {
     double divisor, inverse;
     bool is_power_of_two;
@@ -96,7 +96,7 @@ HWY_INLINE D operator/(D x, const Divisor& by) {
     return by.is_power_of_two ? x * D(by.inverse) : x / D(by.divisor);
 }
 
-/// The first of two that are equal, so that zeros of either sign come out alike from every word.
+/// Returns the first of two equal numbers, so that zeros of either sign come out alike in every word.
 template <class D>
 HWY_INLINE D lesser(D a, D b) {
     return choose(b < a, b, a);
@@ -111,7 +111,7 @@ HWY_INLINE D greater(D a, D b) {
 template <class D>
 using RealVector = std::array<D, 3>;
 
-/// v / |v|; zero for a vector too short to have a direction.
+/// v / |v|, or zero where |v| is too small to give a direction.
 template <class D>
 HWY_INLINE RealVector<D> unit_vector(const RealVector<D>& v) {
     const D squares = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
@@ -126,7 +126,7 @@ struct RayOf {
     RealVector<D> origin, direction;  // world; unit length
 };
 
-/// Camera::ray for columns and rows that are whole numbers.
+/// Camera::ray for columns and rows that are integers.
 template <class D>
 HWY_INLINE RayOf<D> ray_through(const Camera& camera, D column, D row) {
     const D scale(camera.half_height / camera.height);
@@ -141,19 +141,19 @@ HWY_INLINE RayOf<D> ray_through(const Camera& camera, D column, D row) {
     return {{D(camera.eye.x), D(camera.eye.y), D(camera.eye.z)}, unit_vector(moved)};
 }
 
-/// The part of a ray inside a box [low, high], as distances along it: both zero where there is none.
+/// The part of a ray inside a box [low, high], as distances along the ray: both zero where there is none.
 template <class D>
 struct IntervalOf {
     D first, last;
 };
 template <class D>
 HWY_INLINE IntervalOf<D> intersect_box(const RayOf<D>& ray, const Vec3& low, const Vec3& high) {
-    IntervalOf<D> inside{D(0), D(std::numeric_limits<double>::infinity())};  // nothing lies behind the eye
+    IntervalOf<D> inside{D(0), D(std::numeric_limits<double>::infinity())};  // nothing behind the eye is seen
     auto outside = D(0) < D(0);
     for (int axis = 0; axis < 3; ++axis) {
         const auto a = static_cast<std::size_t>(axis);
         const D origin = ray.origin[a], from(low[axis]), to(high[axis]);
-        // Parallel to this pair of faces: in one of them is inside.
+        // A ray parallel to this pair of faces: a ray within a face counts as inside.
         const auto parallel = ray.direction[a] == D(0);
         outside = outside | (parallel & ((origin < from) | (to < origin)));
         const D direction = choose(parallel, D(1), ray.direction[a]);

@@ -3,7 +3,7 @@
 
 namespace squint {
 
-/// Both take [0, 1] to [0, 1]; what lies below 0 is 0, what lies above 1 continues the curve.
+/// Both map [0, 1] to [0, 1]; below 0 they give 0, above 1 they continue the curve.
 double srgb_from_linear(double linear);
 double linear_from_srgb(double encoded);
 

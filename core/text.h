@@ -1,4 +1,4 @@
-// Texts from files and command lines in messages: one line of ASCII, so that no byte of theirs reaches a terminal.
+// Makes text from files and command lines safe for messages: one line of ASCII, no raw bytes for a terminal.
 #pragma once
 
 #include <cstddef>
@@ -10,17 +10,17 @@ namespace squint {
 /// The code point that starts at `i` in UTF-8, moving `i` past it; U+FFFD for a byte that starts none.
 char32_t next_code_point(std::string_view text, std::size_t& i);
 
-/// UTF-8 of a code point.
+/// A code point as UTF-8.
 std::string utf8_of(char32_t code);
 
-/// Printable ASCII as it is, other characters as \u00FC, control characters and bytes of no character as ?.
+/// Keeps printable ASCII; other characters become \u00FC, control characters and invalid bytes become ?.
 std::string printable(std::string_view text);
 
-/// The same, at most `most` characters: a longer text keeps its beginning.
+/// The same, cut to at most `most` characters: a longer text keeps its beginning.
 std::string excerpt(std::string_view text, std::size_t most = 60);
 
-/// A message of at most two lines of a terminal: a longer one keeps its beginning and its end, for where it was
-/// and what is allowed stand there.
+/// Cuts a message to two lines of a terminal.  A longer one keeps its beginning, which says where it was, and
+/// its end, which says what is allowed.
 std::string message_text(std::string_view text);
 
 }  // namespace squint

@@ -18,7 +18,7 @@ namespace {
 constexpr int kMostEntries = 1 << 16;
 
 /// Piecewise linear between ascending points, constant outside; at a step the later point holds.  Remembers
-/// where it was, so that values in order cost no search.
+/// its place, so that ascending values need no search.
 template <class Point, class Value>
 class Curve {
   public:
@@ -41,13 +41,13 @@ class Curve {
     std::size_t after_ = 0;  // the first point whose value is greater
 };
 
-/// Curve's values at `count` samples, a stretch between two points at a time.  parts(point): its channels;
+/// Samples a curve at `count` entries, one stretch between two points at a time.  parts(point): its channels;
 /// results: where each channel's samples go.
 template <class Point, class Parts>
 void sample_curve(const std::vector<Point>& points, const SampleValues& values, int count, const Parts& parts,
                   std::span<double* const> results) {
     const bool ascending = values.scale > 0;
-    // The first sample that does not stand before `value` as samples run.
+    // The first sample that is not before `value` in the order of samples.
     const auto first_at = [&](double value, int from) {
         int low = from, high = count;
         while (low < high) {
@@ -78,7 +78,7 @@ void sample_curve(const std::vector<Point>& points, const SampleValues& values, 
     flat(count, final);
 }
 
-/// -ln(1 - alpha) / unit_distance of alphas capped.
+/// -ln(1 - alpha) / unit_distance, with alphas limited.
 void extinction_of(std::span<const double> alpha, double unit_distance, std::span<double> extinction) {
     for (std::size_t i = 0; i < alpha.size(); ++i)
         extinction[i] = -std::min(alpha[i], kLargestTranslucentAlpha);
@@ -166,7 +166,7 @@ Entries sample_entries(const TransferFunction& function, const Volume& volume) {
         std::span(&alpha, 1));
     extinction_of(std::span(alpha, size), function.unit_distance, std::span(extinction, size));
     entries.entry.reserve(size);
-    std::array<Entry, 64> block;  // in the cache: to set all of them to zero first takes as long as the rest
+    std::array<Entry, 64> block;  // in the cache; zeroing all entries first would take as long as the rest
     for (std::size_t i = 0; i < size; i += block.size()) {
         const std::size_t end = std::min(size - i, block.size());
         for (std::size_t k = 0, j = i; k < end; ++k, ++j)

@@ -1,5 +1,5 @@
 // The transfer function: control points in the file's units -> E entries over the scalar range, which *are*
-// the function for every method and for the reference (docs/conventions.md#scalars-and-transfer-function).
+// the function for all methods and the reference (docs/conventions.md#scalars-and-transfer-function).
 #pragma once
 
 #include "core/vector.h"
@@ -22,7 +22,7 @@ struct OpacityPoint {
     bool operator==(const OpacityPoint&) const = default;
 };
 
-/// Straight linear-light colour and alpha, linear between points, constant outside.
+/// Straight (not premultiplied) linear-light colour, and alpha; linear between points, constant outside.
 struct TransferFunction {
     std::vector<ColorPoint> color;      // ascending; two points at one value make a step
     std::vector<OpacityPoint> opacity;  // ascending
@@ -34,10 +34,10 @@ struct TransferFunction {
     double alpha_at(double value) const;
 };
 
-/// Entries where a scene does not say: one per level, at most so many.
+/// The number of entries where a scene does not say: one per level, and at most this many.
 inline constexpr int kDefaultEntries = 4096;
 
-/// Every alpha but exactly 1 is capped here.
+/// Every alpha except exactly 1 is limited to this.
 inline constexpr double kLargestTranslucentAlpha = 1 - 1.0 / 4096;
 
 /// One entry of the sampled function.
@@ -50,8 +50,8 @@ struct Entry {
     bool is_visible() const { return extinction > 0 || opaque; }
 };
 
-/// The sampled function.  Entry i stands at scalar i * scalars_per_entry; between entries extinction and
-/// colour are linear.
+/// The sampled function.  Entry i stands at scalar i * scalars_per_entry; extinction and colour are linear
+/// between entries.
 struct Entries {
     std::vector<Entry> entry;
     double scalars_per_entry = 1;
@@ -62,11 +62,11 @@ struct Entries {
     bool any_opaque() const;
 };
 
-/// Checks points (at least one each, finite, ascending, colours and alphas in [0,1], unit_distance > 0) and
-/// throws InputError.
+/// Throws InputError unless there is at least one point of each kind, points are finite and ascending,
+/// colours and alphas are in [0,1] and unit_distance > 0.
 void check(const TransferFunction& function);
 
-/// Samples the function over [0, volume.largest_representable()].  Uses portable log: same bits everywhere.
+/// Samples it over [0, volume.largest_representable()].  Uses the portable log: same bits everywhere.
 Entries sample_entries(const TransferFunction& function, const Volume& volume);
 
 }  // namespace squint

@@ -46,7 +46,7 @@ Vec3 decoded(const Vec3& color, bool srgb) {
                 : color;
 }
 
-/// Groups of `stride` numbers, each beginning with its value.
+/// Groups of `stride` numbers; each group begins with its value.
 void check_groups(std::span<const double> numbers, std::size_t stride, const std::string& path,
                   const std::string& name) {
     if (numbers.empty() || numbers.size() % stride != 0)
@@ -69,7 +69,7 @@ std::vector<ColorPoint> color_points(std::span<const double> numbers, bool srgb,
     return points;
 }
 
-/// The last look at what was imported: order and ranges, with the file's name in front.
+/// Checks the order and the ranges of an imported function; messages begin with the file's name.
 TransferFunction checked(TransferFunction function, const std::string& path) {
     function.name = path;
     check(function);
@@ -80,7 +80,7 @@ TransferFunction checked(TransferFunction function, const std::string& path) {
 
 using Json = nlohmann::json;
 
-/// A comma with nothing but space and comments before the bracket that follows is none: people's editors leave them.
+/// Removes a comma with only space and comments before a closing bracket: editors of text leave them.
 std::string without_trailing_commas(std::string text) {
     std::size_t comma = std::string::npos;
     for (std::size_t i = 0; i < text.size(); ++i) {
@@ -104,7 +104,7 @@ std::string without_trailing_commas(std::string text) {
     return text;
 }
 
-/// Comments and trailing commas are let pass.
+/// Parses JSON, and accepts comments and trailing commas.
 Json read_json(const std::string& path) {
     return Json::parse(without_trailing_commas(read_text(path)), nullptr, true, true);
 }
@@ -121,7 +121,7 @@ std::vector<double> json_numbers(const Json& map, const char* key, const std::st
     return numbers;
 }
 
-/// Where a curve bends by a midpoint and a sharpness of its own, it is none of straight pieces.
+/// Refuses a curve with a midpoint or a sharpness of its own: it is not piecewise linear.
 void check_straight(double midpoint, double sharpness, const std::string& path, const std::string& name,
                     std::size_t point) {
     if (midpoint != 0.5 || sharpness != 0)
@@ -136,7 +136,7 @@ std::string name_of(const Json& map) {
     return name != map.end() && name->is_string() ? name->get<std::string>() : "";
 }
 
-/// The colour map of that name, or the only one of the file: an object, or a list.
+/// The colour map of that name, or the only one of the file, which is an object or a list.
 const Json& chosen_map(const Json& document, const std::string& wanted, const std::string& path) {
     std::vector<const Json*> maps;
     if (document.is_array())
@@ -178,7 +178,7 @@ ColorSpace color_space_of(const Json& map, const std::string& path) {
                excerpt(space)));
 }
 
-/// R G B between the points in their space -> points between which they are linear.
+/// Points with R G B between them in their space -> points with linear colour between them.
 std::vector<double> sampled(const std::vector<double>& points, ColorSpace space, const std::string& path) {
     if (space == ColorSpace::rgb || points.empty() || points.size() % 4 != 0) return points;
     const std::size_t count = points.size() / 4;
@@ -217,12 +217,12 @@ TransferFunction paraview_function(const Json& map, bool srgb, const std::string
                 : "there is no RGBPoints, allowed are continuous colour maps");
     const std::vector<double> colors = json_numbers(map, "RGBPoints", path);
     (void)color_points(colors, false, path,
-                       "RGBPoints");  // a point that is wrong is named as the file counts it
+                       "RGBPoints");  // a wrong point is named by its number in the file
 
     TransferFunction function;
     function.color = color_points(sampled(colors, space, path), srgb, path, "RGBPoints");
     if (!map.contains("Points") ||
-        map["Points"].is_null()) {  // what ParaView shows of a map that has colours alone
+        map["Points"].is_null()) {  // what ParaView shows for a map without opacities
         function.opacity = {{function.color.front().value, 0}, {function.color.back().value, 1}};
         return function;
     }
@@ -237,7 +237,7 @@ TransferFunction paraview_function(const Json& map, bool srgb, const std::string
 
 // ---- 3D Slicer
 
-/// The lines of a file, without the ends of lines and without empty ones.
+/// The lines of a file, without line ends and without empty lines.
 std::vector<std::string> lines_of(const std::string& text) {
     std::vector<std::string> lines;
     for (std::size_t at = 0; at < text.size();) {
@@ -250,7 +250,7 @@ std::vector<std::string> lines_of(const std::string& text) {
     return lines;
 }
 
-/// One number of a line of text, for a "C" locale whatever the program's is.
+/// Parses a number of a line as the "C" locale does, whatever the program's locale.
 std::optional<double> number_at(const std::string& line, std::size_t& at) {
     at = std::min(line.find_first_not_of(" \t", at), line.size());
     const std::size_t end = std::min(line.find_first_of(" \t", at), line.size());
@@ -261,7 +261,7 @@ std::optional<double> number_at(const std::string& line, std::size_t& at) {
     return number;
 }
 
-/// A line "N a b c ...": N numbers follow.
+/// Parses a line "N a b c ...": N, then N numbers.
 std::vector<double> counted_numbers(const std::string& line, const std::string& path,
                                     const std::string& name) {
     std::size_t at = 0;
@@ -292,7 +292,7 @@ void check_gradient_opacity(double opacity, const std::string& path) {
 
 TransferFunction slicer_function(const std::vector<std::string>& lines, bool srgb, const std::string& path) {
     constexpr std::size_t kSettings =
-        6;  // interpolation, shade, diffuse, ambient, specular, power: the scene's own affair
+        6;  // interpolation, shade, diffuse, ambient, specular, power: the scene decides these
     if (lines.size() != kSettings + 3)
         refuse(path,
                fmt::format("{} lines, allowed are 9: six settings, scalar opacity, gradient opacity, colour",
@@ -316,7 +316,7 @@ TransferFunction slicer_function(const std::vector<std::string>& lines, bool srg
     return function;
 }
 
-/// A member of a JSON object; refuses with what is there instead.
+/// A member of a JSON object; the error says what is there instead.
 const Json& member(const Json& object, const char* key, const std::string& path) {
     const auto found = object.is_object() ? object.find(key) : object.end();
     if (found == object.end())
@@ -404,7 +404,7 @@ TransferFunction imagevis3d_function(const std::string& text, bool srgb, const s
     return function;
 }
 
-/// What reads a JSON file; its errors become one line.
+/// Runs a reader of JSON and turns its errors into one line.
 template <class Read>
 TransferFunction from_json(const std::string& path, const Read& read) {
     try {
@@ -433,19 +433,19 @@ constexpr Vec3 kSkin(0.82, 0.46, 0.32), kFat(0.85, 0.62, 0.28), kFlesh(0.55, 0.1
 // with contrast 150 to 450, cancellous bone 200 to 700, cortical bone 700 to 2000, enamel above 2000.
 const std::vector<Preset>& presets() {
     static const std::vector<Preset> list{
-        // Bone alone, soft at its spongy edge.
+        // Bone alone, translucent at its spongy edge.
         {"ct_bone",
          {{150, kFlesh}, {350, kBone}, {1500, kBone}, {2200, kEnamel}},
          {{150, 0}, {300, 0.08}, {700, 0.45}, {1500, 0.85}}},
-        // The surface of bone, opaque: what a fracture looks like.
+        // The surface of bone, opaque: shows fractures.
         {"ct_bone_surface", {{250, kBone}, {1500, kBone}, {2200, kEnamel}}, {{250, 0}, {300, 1}}},
         // The surface of the body: a thin rise from air, then dense.
         {"ct_skin", {{-500, kSkin}, {50, kSkin}, {300, kBone}}, {{-450, 0}, {-250, 0.5}, {-150, 0.9}}},
-        // Skin as a veil with bone under it.
+        // Skin as a veil over bone.
         {"ct_skin_and_bone",
          {{-400, kSkin}, {100, kSkin}, {250, kBone}, {2200, kEnamel}},
          {{-400, 0}, {-250, 0.03}, {-150, 0.01}, {150, 0.01}, {300, 0.3}, {1000, 0.9}}},
-        // Muscle and organs; fat is a breath, bone shines through.
+        // Muscle and organs; fat is faint, bone shines through.
         {"ct_muscle",
          {{-150, kFat}, {-30, kFat}, {20, kFlesh}, {120, kFlesh}, {300, kBone}, {2000, kEnamel}},
          {{-150, 0}, {-60, 0.01}, {10, 0.03}, {50, 0.35}, {120, 0.35}, {250, 0.3}, {700, 0.8}}},
@@ -457,7 +457,7 @@ const std::vector<Preset>& presets() {
         {"ct_vessels",
          {{100, kFlesh}, {160, kBlood}, {400, kBlood}, {550, kBone}, {2000, kEnamel}},
          {{110, 0}, {170, 0.25}, {300, 0.7}, {420, 0.7}, {550, 0.15}, {1500, 0.25}}},
-        // Everything at once, for a first look.
+        // All tissues at once, for a first look.
         {"ct_overview",
          {{-600, kLung},
           {-150, kFat},

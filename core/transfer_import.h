@@ -1,4 +1,4 @@
-// Transfer functions written by other programs, and presets for CT in HU.
+// Imports transfer functions of other programs; has presets for CT in HU.
 #pragma once
 
 #include "core/transfer_function.h"
@@ -9,12 +9,12 @@
 
 namespace squint {
 
-/// ct_bone, ct_skin, ct_muscle, ct_lung, ct_vessels, ... in HU; unit_distance is 1 mm, so spacings must be in
-/// millimetres.
+/// ct_bone, ct_skin, ct_muscle, ct_lung, ct_vessels, ... in HU.  Their unit_distance is 1 mm, so spacings
+/// must be in millimetres.
 std::vector<std::string> transfer_preset_names();
 bool find_transfer_preset(std::string_view name, TransferFunction& function);
 
-/// ParaView's JSON colour map: an object, or a list of them, of which `map` names one (empty: the only one), with
+/// ParaView's JSON colour map: an object, or a list of which `map` names one (empty: the only one), with
 ///
 ///     "RGBPoints": [value, r, g, b, ...]                   required
 ///     "Points": [value, alpha, midpoint, sharpness, ...]   midpoint 0.5 and sharpness 0; absent: alpha rises from 0
@@ -22,9 +22,9 @@ bool find_transfer_preset(std::string_view name, TransferFunction& function);
 ///     "ColorSpace": "RGB"                                  absent: RGB; HSV ("HSVWrap": 1: the shorter way round),
 ///                                                          Lab, CIELAB, Diverging and Step are sampled
 ///
-/// Values are taken as they are, in the units of the volume's file: ParaView's own maps span [0, 1], and
-/// `transfer_function.range` stretches them.  Other keys are ignored; comments and trailing commas are let pass.
-/// `srgb` decodes the points' colours.  Throws InputError for the rest.
+/// Values are taken as they are, in the units of the volume's file.  ParaView's own maps span [0, 1]:
+/// `transfer_function.range` stretches them.  Other keys are ignored; comments and trailing commas are
+/// accepted. `srgb` decodes the points' colours.  Throws InputError for all else.
 TransferFunction import_paraview_json(const std::string& path, const std::string& map, bool srgb,
                                       double unit_distance);
 
@@ -35,15 +35,15 @@ TransferFunction import_paraview_json(const std::string& path, const std::string
 ///     N value alpha ...                                         gradient opacity: 1 everywhere, or no points
 ///     N value r g b ...                                         colour
 ///
-/// Slicer keeps no unit distance in it: 1, as VTK's default.  Throws InputError for the rest.
+/// Slicer stores no unit distance here: it is 1, VTK's default.  Throws InputError for all else.
 TransferFunction import_slicer_vp(const std::string& path, bool srgb);
 
-/// 3D Slicer's JSON volume property (.vp.json) of one component: its `rgbTransferFunction`, `scalarOpacity` and
-/// `scalarOpacityUnitDistance` (absent: 1); `gradientOpacity` must be 1 everywhere.  Throws InputError for the rest.
+/// 3D Slicer's JSON volume property (.vp.json), one component: `rgbTransferFunction`, `scalarOpacity`,
+/// `scalarOpacityUnitDistance` (absent: 1); `gradientOpacity` must be 1.  Throws InputError for all else.
 TransferFunction import_slicer_json(const std::string& path, bool srgb);
 
-/// ImageVis3D's one-dimensional function (.1dt): a count and as many colours r g b a, of the values 0, 1, 2 ...
-/// Throws InputError.
+/// ImageVis3D's one-dimensional function (.1dt): a count, then as many colours r g b a, for the values 0, 1,
+/// 2 ... Throws InputError.
 TransferFunction import_imagevis3d(const std::string& path, bool srgb, double unit_distance);
 
 }  // namespace squint

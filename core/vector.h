@@ -1,4 +1,4 @@
-// Vectors of doubles: Imath's, under one name.
+// Vectors of doubles: Imath's types under our names.
 #pragma once
 
 #include <Imath/ImathVec.h>

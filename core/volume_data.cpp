@@ -1,4 +1,4 @@
-// Memory of voxels: allocated or mapped, measured and named.
+// Memory of voxels: allocates or maps it, measures and names it.
 #include "core/volume_data.h"
 
 #include "core/error.h"
@@ -28,8 +28,8 @@ constexpr std::size_t kHugePage = std::size_t{1} << 21;
     throw InputError(fmt::format("{}: cannot read: {}", where, std::strerror(error)));
 }
 
-/// Scalars are measured and hashed in pieces of this size, side by side; the pieces' hashes are hashed in
-/// order.
+/// Scalars are measured and hashed in pieces of this size, side by side; the pieces' hashes are then hashed
+/// in order.
 constexpr std::size_t kPieceBytes = std::size_t{1} << 22;
 
 struct Piece {
@@ -37,7 +37,7 @@ struct Piece {
     std::string hash;
 };
 
-/// 64 running minima and maxima side by side: a shape that compilers turn into vector code.
+/// 64 running minima and maxima side by side: compilers turn this shape into vector code.
 template <class Scalar>
 Piece measure_piece(const Scalar* scalars, std::size_t count) {
     constexpr std::size_t kLanes = 64;
@@ -61,17 +61,17 @@ Piece measure_piece(const Scalar* scalars, std::size_t count) {
             hasher.hex()};
 }
 
-/// Where a file has no data.  None where the file is not sparse or its system cannot say.
+/// The holes of a file: none where it is not sparse or its system cannot tell.
 std::vector<ByteRun> holes_of(int file, const struct stat& status) {
     constexpr std::int64_t kSector = 512;        // the unit of st_blocks
-    constexpr std::size_t kMostHoles = 1 << 16;  // a file of many more is read like any other from there on
+    constexpr std::size_t kMostHoles = 1 << 16;  // a file with more is read in full from there on
     std::vector<ByteRun> holes;
     if (status.st_blocks * kSector >= status.st_size) return holes;
     for (off_t at = 0; at < status.st_size && holes.size() < kMostHoles;) {
         const off_t hole = lseek(file, at, SEEK_HOLE);
         if (hole < 0 || hole >= status.st_size) break;
         const off_t data = lseek(file, hole, SEEK_DATA);
-        if (data < 0 && errno != ENXIO) break;  // ENXIO: none behind it
+        if (data < 0 && errno != ENXIO) break;  // ENXIO: no data after it
         at = data < 0 ? status.st_size : data;
         holes.push_back({static_cast<std::size_t>(hole), static_cast<std::size_t>(at)});
     }
@@ -101,7 +101,7 @@ MappedFile map_file(const std::string& path) {
     if (fstat(file, &status) != 0) refuse(path, errno);
     if (!S_ISREG(status.st_mode)) throw InputError(fmt::format("{}: cannot read: not a regular file", path));
 
-    // Zero pages first, the file over their beginning: at least one page of zeros stays behind it.
+    // Map zero pages first, then the file over their beginning: at least one page of zeros stays after it.
     const std::size_t page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
     const std::size_t size = static_cast<std::size_t>(status.st_size);
     const std::size_t reserved = (size / page + 2) * page;

@@ -1,4 +1,4 @@
-// Memory of voxels: allocated or mapped, measured and named.  For the loaders of volumes only.
+// Memory of voxels: allocates or maps it, measures and names it.  Only for loaders of volumes.
 #pragma once
 
 #include "core/volume.h"
@@ -11,12 +11,12 @@
 
 namespace squint {
 
-/// Readable bytes after the last voxel, whether allocated or mapped: a wide load of the last voxel stays
-/// within bounds.
+/// Bytes that can be read after the last voxel, in allocated and in mapped memory: a wide load of the last
+/// voxel stays within bounds.
 inline constexpr std::size_t kPaddingBytes = 64;
 
-/// `bytes` uninitialised and kPaddingBytes of zeros after them.  Throws InputError naming `where` if there is
-/// no memory.
+/// Allocates `bytes`, not initialised, and kPaddingBytes of zeros after them.  Throws InputError naming
+/// `where` if there is no memory.
 std::shared_ptr<void> allocate_voxels(std::size_t bytes, const std::string& where);
 
 /// Bytes [first, end) of a file.
@@ -24,18 +24,18 @@ struct ByteRun {
     std::size_t first = 0, end = 0;
 };
 
-/// A whole file, read-only, with kPaddingBytes readable after it.
+/// A whole file, mapped read-only, with kPaddingBytes readable after it.
 struct MappedFile {
     std::shared_ptr<const unsigned char> bytes;
     std::size_t size = 0;
-    std::vector<ByteRun> holes;  // of a sparse file: zeros that lie on no disk; in order
+    std::vector<ByteRun> holes;  // of a sparse file: zeros without disk blocks; ascending
 };
-/// Throws InputError: no such file, not a regular file.  A file that shrinks while mapped ends the process
-/// (SIGBUS).
+/// Maps a file.  Throws InputError if there is none or it is not regular.  A file that shrinks while it is
+/// mapped ends the process (SIGBUS).
 MappedFile map_file(const std::string& path);
 
-/// x y z -> bytes, in wide arithmetic.  Throws InputError when a dimension is below 1 or the product reaches
-/// 2^62.
+/// The bytes of x y z voxels, in wide arithmetic.  Throws InputError when a dimension is below 1 or the
+/// product reaches 2^62.
 std::size_t checked_bytes(const Index3& dims, std::size_t scalar_bytes, const std::string& where);
 
 /// Throws InputError when a spacing is not finite or not positive.
@@ -44,10 +44,10 @@ void check_spacing(const Vec3& spacing, const std::string& where);
 /// "256x256x128".
 std::string text_of(const Index3& dims);
 
-/// Bits that hold `largest`, at least 1.
+/// The number of bits that hold `largest`, at least 1.
 int bits_for(std::uint64_t largest);
 
-/// Sets smallest, largest and content_hash from dims, type and data.  What is known to be zero is not read.
+/// Sets smallest, largest and content_hash from dims, type and data.  Does not read what is known to be zero.
 void measure(Volume& volume);
 
 }  // namespace squint

@@ -1,4 +1,4 @@
-// The [volume] part of a scene -> a volume: a file or folder of any kind that is read, or a procedural field.
+// Loads the volume of a [volume] table: a file or folder of any kind that is read, or a procedural field.
 #include "core/volume_source.h"
 
 #include "core/error.h"
@@ -56,7 +56,7 @@ StoredVolume read_raw(const VolumeSource& source, const MappedFile& file) {
     return stored;
 }
 
-/// What a file or folder is, by its name and its first bytes.
+/// The kind of a file or folder, by its name and its first bytes.
 enum class Kind { raw, nrrd, meta_image, nifti, dicom, vti, pictures };
 
 std::string extension_of(const std::string& path) {
@@ -70,7 +70,7 @@ bool is_picture(const std::string& extension) {
     return extension == ".tif" || extension == ".tiff" || extension == ".png";
 }
 
-/// A folder of slices: of pictures where one lies there, otherwise of DICOM.
+/// Loads a folder of slices: of pictures where it holds one, otherwise of DICOM.
 Kind kind_of_folder(const std::string& path) {
     std::error_code error;
     for (const auto& entry : std::filesystem::directory_iterator(path, error))

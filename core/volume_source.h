@@ -1,4 +1,4 @@
-// Where a volume comes from: the [volume] part of a scene, and the one function that loads it.
+// Where a volume comes from: the [volume] part of a scene, and the function that loads it.
 #pragma once
 
 #include "core/volume.h"
@@ -10,7 +10,7 @@
 
 namespace squint {
 
-/// Exactly one of `file`, `procedural` is set.  Everything but these two has a default.
+/// Exactly one of `file` and `procedural` is set.  All others have defaults.
 struct VolumeSource {
     std::string file = {};                // a file or folder, variables already expanded: docs/formats.md
     std::string procedural = "phantom";   // used when `file` is empty; names in procedural.h
@@ -21,7 +21,7 @@ struct VolumeSource {
     std::vector<double> spacing = {};     // raw: default 1 1 1; otherwise overrides the file's
     std::vector<double> window = {};      // [least, greatest] in the file's units; floats: default all finite
     int bits = 0;                         // float data: bits the window is quantised to, 1 to 16; 0: 16
-    /// value = value_scale * stored + value_offset; absent: what the file declares, or 1 and 0.
+    /// value = value_scale * stored + value_offset; absent: as the file declares, or 1 and 0.
     std::optional<double> value_scale = {}, value_offset = {};
     std::optional<double> nan = {};     // the value of voxels that are not a number
     std::optional<int> component = {};  // of files with several numbers a voxel or several times
@@ -33,9 +33,9 @@ struct LoadLimits {
     std::int64_t max_bytes = std::int64_t{1} << 40;  // refuse to hold more voxels than this in memory
 };
 
-/// Loads, checks, converts to levels and measures a volume.  Throws InputError naming the file and what is
-/// wrong with it. `notes` receives one line for everything a user should know (float data quantised to n
-/// bits, axes permuted, ...).
+/// Loads a volume, checks it, converts it to levels and measures it.  Throws InputError naming the file and
+/// what is wrong with it.  `notes` receives a line for each thing that a user should know (floats quantised
+/// to n bits, axes permuted, ...).
 Volume load_volume(const VolumeSource& source, const LoadLimits& limits = {},
                    std::vector<std::string>* notes = nullptr);
 

@@ -1,4 +1,4 @@
-// Voxels as a file stores them -> a volume of levels (docs/conventions.md#scalars-and-transfer-function).
+// Turns voxels as a file stores them into levels (docs/conventions.md#scalars-and-transfer-function).
 #include "core/volume_stored.h"
 
 #include "core/error.h"
@@ -21,13 +21,12 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "levels lie in memory as little-endian words");
 
-/// Levels are numbers of 16 bits.
+/// The number of bits of a level.
 constexpr std::int64_t kMostLevels = 65536;
 
-// --- Types
-// -----------------------------------------------------------------------------------------------------------
+// --- Types -------------------------------------------------------------------------------------------------
 
-/// visit(T{}) with the type of a stored voxel.
+/// Calls visit(T{}) with the type of a stored voxel.
 template <class Visit>
 auto with_type(StoredType type, const Visit& visit) {
     switch (type) {
@@ -61,8 +60,7 @@ bool is_signed(StoredType type) {
     return with_type(type, [](auto voxel) { return std::is_signed_v<decltype(voxel)>; });
 }
 
-// --- Reading stored voxels
-// -----------------------------------------------------------------------------------------------
+// --- Reading stored voxels ---------------------------------------------------------------------------------
 
 template <class T>
 struct Reader {
@@ -92,7 +90,7 @@ Reader<T> reader(const StoredVolume& stored) {
     return {stored.inflated ? stored.inflated.get() : stored.bytes.get(), stored.big_endian};
 }
 
-/// Where the voxel (x, y, z) of world order lies in the file: first + x * step.x + y * step.y + z * step.z.
+/// Where voxel (x, y, z) of world order lies in the file: first + x * step.x + y * step.y + z * step.z.
 struct FileOrder {
     Index3 dims, step;
     std::int64_t first;
@@ -110,8 +108,8 @@ struct FileOrder {
     }
 };
 
-/// The numbers of the component that is meant, side by side: fold(so far, number) over all, then
-/// join(a, b).
+/// Folds the numbers of the chosen component, in parallel: fold(so far, number) over all, then join(a,
+/// b).
 template <class T, class Part, class Fold, class Join>
 Part reduce_voxels(const StoredVolume& stored, const Part& none, const Fold& fold, const Join& join) {
     const Reader<T> read = reader<T>(stored);
@@ -129,7 +127,7 @@ Part reduce_voxels(const StoredVolume& stored, const Part& none, const Fold& fol
         join);
 }
 
-/// levels[world order] = convert(voxel, its index in the file), rows side by side.
+/// Sets levels[world order] = convert(voxel, its index in the file), rows in parallel.
 template <class T, class Scalar, class Convert>
 void convert_voxels(const StoredVolume& stored, void* levels, const Convert& convert) {
     const Reader<T> read = reader<T>(stored);
@@ -149,7 +147,7 @@ void convert_voxels(const StoredVolume& stored, void* levels, const Convert& con
     });
 }
 
-/// Memory for the levels: the file's own where each level takes the place of its voxel, otherwise new.
+/// Memory for the levels: the file's own where a level fits the place of its voxel, otherwise new.
 std::shared_ptr<void> room_for_levels(const StoredVolume& stored, const Volume& volume,
                                       const LoadLimits& limits) {
     const std::size_t bytes = stored.voxels() * volume.scalar_bytes();
@@ -172,8 +170,7 @@ void convert_all(Volume& volume, const StoredVolume& stored, const LoadLimits& l
     volume.data = levels;
 }
 
-// --- Integers: subtract the least
-// ------------------------------------------------------------------------------------------
+// --- Integers: subtract the least --------------------------------------------------------------------------
 
 struct Shift {
     std::int64_t least, greatest;
@@ -190,16 +187,15 @@ struct Shift {
     void count(std::int64_t clamped) const { outside.fetch_add(clamped, std::memory_order_relaxed); }
 };
 
-// --- Floats: round to the levels of a window
-// ---------------------------------------------------------------------------------
+// --- Floats: round to the levels of a window ---------------------------------------------------------------
 
 struct Quantise {
     double scale, offset;                     // file's units from stored
     double least, greatest, levels_per_unit;  // of the window, in the file's units
     double last_level;
-    double nan;  // in the file's units, what stands for a voxel that is not a number; or none
+    double nan;  // in the file's units: the value for voxels that are NaN, if any
     std::atomic<std::int64_t>& outside;
-    std::atomic<std::int64_t>& not_a_number;  // least index in the file
+    std::atomic<std::int64_t>& not_a_number;  // least index in the file of a NaN voxel
 
     template <class T>
     std::int64_t operator()(T voxel, std::int64_t index, std::int64_t& clamped) const {
@@ -221,10 +217,9 @@ struct Quantise {
     void count(std::int64_t clamped) const { outside.fetch_add(clamped, std::memory_order_relaxed); }
 };
 
-// --- Settings
-// --------------------------------------------------------------------------------------------------------------
+// --- Settings ----------------------------------------------------------------------------------------------
 
-/// Everything a scene and a file say about values, settled.
+/// How values map to levels: from the scene's settings and the file's.
 struct Values {
     double scale = 1, offset = 0;  // value = scale * stored + offset
     bool windowed = false;
@@ -266,7 +261,7 @@ void note_clamped(const StoredVolume& stored, const Values& values, std::int64_t
                         stored.where, clamped, stored.voxels(), values.least, values.greatest));
 }
 
-/// The window of floats that have none: from the least to the greatest finite value.
+/// The window of floats where none is given: from the least to the greatest finite value.
 void window_from_data(Values& values, const StoredVolume& stored) {
     struct Range {
         double least = std::numeric_limits<double>::infinity(),
@@ -292,7 +287,7 @@ void window_from_data(Values& values, const StoredVolume& stored) {
         if (!(range.least <= range.greatest)) ends[0] = ends[1] = values.nan;
         ends[0] = std::min(ends[0], values.nan), ends[1] = std::max(ends[1], values.nan);
     } else if (!(range.least <= range.greatest)) {
-        if (range.nan) ends[0] = 0, ends[1] = 1;  // the first such voxel is refused by its place
+        if (range.nan) ends[0] = 0, ends[1] = 1;  // refused at the first such voxel, which the message names
     }
     values.least = std::min(ends[0], ends[1]), values.greatest = std::max(ends[0], ends[1]);
     if (values.least == values.greatest) values.greatest += std::max(1.0, std::abs(values.least));
@@ -301,7 +296,7 @@ void window_from_data(Values& values, const StoredVolume& stored) {
             fmt::format("{}: no finite range of values; window = [least, greatest] gives one", stored.where));
 }
 
-/// Floats, and integers whose range needs more levels than there are.
+/// Floats, and integers with a range wider than the levels.
 void quantise(Volume& volume, const StoredVolume& stored, Values values, const LoadLimits& limits,
               std::vector<std::string>& notes) {
     const bool from_data = !values.windowed;
@@ -362,11 +357,11 @@ std::pair<std::int64_t, std::int64_t> measured_range(const StoredVolume& stored)
     });
 }
 
-/// The stored values that levels begin and end at.
+/// The stored values of the lowest and the highest level.
 std::pair<std::int64_t, std::int64_t> stored_range(const StoredVolume& stored, const Values& values) {
     if (values.windowed) {
-        // One level is one stored value: the window snaps to the nearest ones, within what 18 bits (of wide
-        // integers 62) hold.
+        // One level is one stored value: the window snaps to the nearest stored values within 18 bits (62
+        // bits for wide integers).
         const double most = bytes_of(stored.type) <= 2 ? 131072.0 : 0x1p62;
         const auto nearest = [&](double value) {
             return static_cast<std::int64_t>(
@@ -410,7 +405,7 @@ void shift_integers(Volume& volume, const StoredVolume& stored, const Values& va
     volume.value_scale = values.scale;
     volume.value_offset = values.offset + values.scale * static_cast<double>(least);
 
-    // Levels already: taken as they are, without a copy.
+    // Already levels: taken without a copy.
     const unsigned char* bytes = stored.inflated ? stored.inflated.get() : stored.bytes.get();
     const bool aligned = reinterpret_cast<std::uintptr_t>(bytes) % bytes_of(stored.type) == 0;
     const bool levels =
@@ -427,7 +422,7 @@ void shift_integers(Volume& volume, const StoredVolume& stored, const Values& va
     note_clamped(stored, values, outside, notes);
 }
 
-/// Integer bits that hold the window where one is declared, otherwise the data; 8 at least.
+/// Integer bits that hold the declared window, or else the data; at least 8.
 void choose_bits(Volume& volume, const StoredVolume& stored, const Values& values,
                  std::pair<std::int64_t, std::int64_t> range) {
     std::uint64_t largest = volume.largest;
@@ -440,7 +435,7 @@ void choose_bits(Volume& volume, const StoredVolume& stored, const Values& value
         volume.type == ScalarType::u8 && values.bits == 0 ? 8 : std::max(at_least, bits_for(largest));
 }
 
-/// Of the scalars but the least or the greatest: where they end, and how many voxels are left out.
+/// The range of the scalars without the least or the greatest, and how many voxels that leaves out.
 struct Rest {
     std::uint32_t smallest = std::numeric_limits<std::uint32_t>::max(), largest = 0;
     std::int64_t at_smallest = 0, at_largest = 0;  // voxels of the volume's least and greatest scalar
@@ -465,10 +460,10 @@ Rest rest_of(const Volume& volume) {
         });
 }
 
-/// A value that stands apart from all others (what scanners fill up with) makes entries of several levels.
+/// Notes a value far from all others, as scanners pad with: it makes an entry span several levels.
 void note_padding(const Volume& volume, const Values& values, std::vector<std::string>& notes) {
     constexpr std::uint32_t kEntries = 4096;
-    constexpr std::uint32_t kApart = 4;  // a part of the range as large as this is no chance
+    constexpr std::uint32_t kApart = 4;  // a gap of a quarter of the range is no chance
     const std::uint32_t range = volume.largest - volume.smallest;
     if (values.windowed || volume.type != ScalarType::u16 || range < kEntries) return;
     const Rest rest = rest_of(volume);

@@ -1,4 +1,4 @@
-// Scene files and `key=value` overrides -> Scene.  Every value is checked where it stands.
+// Reads scene files and `key=value` overrides.  Checks every value where it is given.
 #include "core/error.h"
 #include "scene/rules.h"
 #include "scene/scene.h"
@@ -24,7 +24,7 @@ std::string bare(const std::string& key) {
     return text.substr(1, text.size() - 2);
 }
 
-/// Puts values of one file, or of one override, into a scene.
+/// Stores the values of one file, or of one override, in a scene.
 class Reader {
   public:
     /// `file` names the file; empty for an override.
@@ -70,7 +70,7 @@ class Reader {
     }
 
     [[noreturn]] void refuse_name(const TomlValue& entry, const std::string& key) const {
-        // The first part of the key that leads nowhere: of a.b.c given on the command line it may be a.
+        // The first part of the key that is unknown: of a.b.c on the command line it may be a.
         std::size_t end = key.find('.');
         while (end != std::string::npos && is_section(key.substr(0, end))) end = key.find('.', end + 1);
         const std::string wrong = key.substr(0, end);
@@ -244,8 +244,8 @@ class Reader {
         return std::all_of(list.items.begin(), list.items.end(),
                            [&](const TomlValue& v) { return is_number(v, key); });
     }
-    /// A list of as many numbers as the setting holds, or none; or one number where three alike may be
-    /// written as one.
+    /// Checks the length of a list, or an empty list; one number is allowed where three equal ones may be
+    /// written so.
     void check_list(const TomlValue& value, std::string_view key, const std::string& allowed) const {
         const auto counts = counts_of(key);
         const bool list = value.kind == Kind::list && are_numbers(value, key) &&
@@ -297,7 +297,7 @@ class Reader {
         return light;
     }
 
-    // --- Of settings that exclude each other the one given last wins -----------------------------
+    // --- Of settings that exclude each other, the one given last wins -----------------------------
 
     void forget_rivals(std::string_view key, std::string_view given) {
         if (given.empty()) return;
@@ -313,8 +313,8 @@ class Reader {
         if (name != "color" && name != "opacity") tf.color.clear(), tf.opacity.clear();
         if (name != "preset") tf.preset.clear();
         if (name != "file") tf.file.clear();
-        // A preset and a .vp file bring their own unit_distance: one that was given for another function is
-        // not theirs.
+        // A preset and a .vp file bring their own unit_distance: one given for another function does not
+        // apply.
         const auto unit = scene_.given_at.find("transfer_function.unit_distance");
         if (name != "file" || function_file(given) != FunctionFile::paraview) tf.map.clear();
         if ((name == "preset" || brings_unit_distance(function_file(given))) &&
@@ -328,7 +328,7 @@ class Reader {
     std::vector<std::string> keys_;
 };
 
-// --- What only several settings together show ----------------------------------------------------
+// --- What only several settings together can show ------------------------------------------------
 
 [[noreturn]] void refuse(const Scene& scene, std::string_view key, std::string_view found,
                          std::string_view allowed) {
@@ -349,7 +349,7 @@ void check_transfer_function(const Scene& scene) {
         if (const std::string key = fmt::format("transfer_function.{}", list);
             given.empty() && scene.given_at.contains(key))
             refuse(scene, key, "an empty list", kOne);
-    if (given.empty() && !scene.volume.file.empty()) return;  // the data bring their own (scene/from_data.h)
+    if (given.empty() && !scene.volume.file.empty()) return;  // the data bring one
     if (given.empty()) refuse(scene, "transfer_function", "none", kOne);
     if (tf.color.empty() != tf.opacity.empty())
         refuse(scene, tf.color.empty() ? "transfer_function.opacity" : "transfer_function.color",
@@ -405,7 +405,7 @@ void apply_override(Scene& scene, const std::string& text) {
         if (whole.items.size() != 1) throw InputError(head + ": found more than one value; allowed: one");
         value = whole.items[0];
     } catch (const InputError& error) {
-        // A bare word or a path; what begins like TOML is meant as TOML.
+        // A bare word or a path; a text that begins like TOML is TOML.
         const auto plain = [](char c) { return static_cast<unsigned char>(c) >= 0x20 && c != 0x7f; };
         if (std::string_view("[{\"'").find(written[0]) != std::string_view::npos ||
             !std::all_of(written.begin(), written.end(), plain))
@@ -423,7 +423,7 @@ bool is_preset_file(const std::string& preset) {
            std::end(kPrecisionPresets);
 }
 
-/// "u1.12 trn" under "rnd" -> "u1.12 rnd": each part that is left out above shows the one below.
+/// Merges wires: "rnd" over "u1.12 trn" gives "u1.12 rnd"; a part absent above is taken from below.
 std::optional<std::string> merged(const std::optional<std::string>& under,
                                   const std::optional<std::string>& over) {
     std::string format, rounding, overflow;
@@ -447,7 +447,7 @@ Scene scene_from(const TomlValue& table, const std::string& name, const std::str
     scene.name = name;
     scene.folder = folder;
     Reader(scene, name).table(table, "");
-    // The default volume gives way to a file.
+    // A file replaces the default volume.
     if (!scene.volume.file.empty() && !scene.given_at.contains("volume.procedural"))
         scene.volume.procedural.clear();
     return scene_with(std::move(scene), overrides);

@@ -10,10 +10,10 @@
 namespace squint {
 namespace {
 
-/// Voxels looked at, evenly apart: enough for a percentile.
+/// Number of voxels looked at, evenly spaced: enough for a percentile.
 constexpr std::int64_t kMostVoxels = std::int64_t{1} << 22;
 
-/// How many of the voxels looked at have each level.
+/// A histogram: how many of those voxels have each level.
 struct Levels {
     std::vector<std::int64_t> count;
     std::int64_t all = 0;
@@ -21,14 +21,14 @@ struct Levels {
     explicit Levels(const Volume& volume) : count(volume.largest + std::size_t{1}) {
         const std::int64_t voxels = volume.voxels();
         std::int64_t apart = std::max<std::int64_t>(1, voxels / kMostVoxels);
-        if (apart > 1) apart |= 1;  // no multiple of a row's length that is a power of two
+        if (apart > 1) apart |= 1;  // odd, so not a multiple of a row's length that is a power of two
         const auto* bytes = static_cast<const std::uint8_t*>(volume.data.get());
         const auto* words = static_cast<const std::uint16_t*>(volume.data.get());
         for (std::int64_t i = 0; i < voxels; i += apart, ++all)
             ++count[volume.type == ScalarType::u8 ? bytes[i] : words[i]];
     }
 
-    /// The part of all voxels from one level to another.
+    /// The share of voxels between two levels.
     double share(double first, double last) const {
         std::int64_t sum = 0;
         for (std::size_t level = 0; level < count.size(); ++level)
@@ -37,7 +37,7 @@ struct Levels {
         return static_cast<double>(sum) / static_cast<double>(all);
     }
 
-    /// The level that splits all into two whose means are farthest apart for their sizes (Otsu 1979, equation 18).
+    /// The level whose two sides have the greatest variance between them (Otsu 1979, equation 18).
     std::size_t threshold() const {
         double sum = 0, below = 0, sum_below = 0, best = -1;
         for (std::size_t level = 0; level < count.size(); ++level)
@@ -55,7 +55,7 @@ struct Levels {
         return split;
     }
 
-    /// The level below which a part of those above `split` lies.
+    /// The level below which `part` of the voxels above `split` lies.
     double percentile(std::size_t split, double part) const {
         std::int64_t above = 0, seen = 0;
         for (std::size_t level = split + 1; level < count.size(); ++level) above += count[level];
@@ -68,7 +68,7 @@ struct Levels {
     }
 };
 
-/// Air near -1000 HU, soft tissue or water near 0, and nothing that no scanner stores.
+/// Whether there is air near -1000 HU, soft tissue or water near 0, and nothing that no scanner stores.
 bool is_hounsfield(const Volume& volume, const Levels& levels) {
     if (volume.modality == "CT") return true;
     if (!volume.modality.empty() || volume.value_scale <= 0) return false;
@@ -80,8 +80,8 @@ bool is_hounsfield(const Volume& volume, const Levels& levels) {
            levels.share(level_of(-200), level_of(200)) > 0.02;
 }
 
-/// From a split of the histogram to its brightest voxels, ever denser.  The fainter part of what is kept lets 256
-/// steps across the volume pass, whatever its units.
+/// Opacity that rises from a split of the histogram to its brightest voxels.  The fainter matter lets light
+/// pass through 256 steps across the volume, whatever its units.
 TransferFunctionSettings histogram_function(const Volume& volume, const Levels& levels, std::size_t split) {
     struct Stop {
         double level, r, g, b, alpha;

@@ -1,4 +1,4 @@
-// A scene made from data alone: what is rendered when a volume stands where a scene is expected.
+// Makes a scene from data alone, for a volume that is given in place of a scene.
 #pragma once
 
 #include "scene/scene.h"
@@ -8,16 +8,16 @@
 
 namespace squint {
 
-/// A scene without a transfer function for the volume in `file`: a headlight, the least power series of the
-/// pre-integration (pips), the whole volume in the picture.
+/// A scene without a transfer function for the volume in `file`: a headlight, the first-order power series of
+/// pre-integration (pips), and a camera that shows the whole volume.
 Scene scene_of_data(const std::string& file);
 
-/// Whether a scene says how its scalars are shown.
+/// Whether a scene has a transfer function.
 bool has_transfer_function(const Scene& scene);
 
-/// Gives a scene without a transfer function the data's own: for CT in Hounsfield units (stated, or recognised by
-/// its air and its soft tissue) one for skin and bone, otherwise one from the histogram.  `notes` gets one line that
-/// says which.
+/// Gives a scene without a transfer function one from its data.  CT in Hounsfield units (stated, or
+/// recognised by its air and soft tissue) gets one for skin and bone, other data one from the histogram.
+/// `notes` receives a line that says which.
 void complete_from_data(Scene& scene, const Volume& volume, std::vector<std::string>& notes);
 
 }  // namespace squint

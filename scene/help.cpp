@@ -1,4 +1,4 @@
-// The list of settings -> --help and docs/scene.md.
+// Writes --help and docs/scene.md from the list of settings.
 #include "scene/rules.h"
 #include "scene/text.h"
 
@@ -102,7 +102,7 @@ constexpr std::string_view kTableHead = "| key | default | allowed | meaning |\n
 
 template <class T>
 std::string allowed_cell(std::string_view key) {
-    // A wire's Spec is described above its table.
+    // The page describes a wire's Spec above its table.
     return std::is_same_v<T, std::optional<std::string>> ? "a spec" : allowed_text<T>(key);
 }
 

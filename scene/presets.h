@@ -1,4 +1,4 @@
-// Precision presets by name.  What they give a wire: pipeline/stages/presets.h.
+// Precision presets by name.  pipeline/stages/presets.h has what they give each wire.
 #pragma once
 
 #include "scene/scene.h"
@@ -10,7 +10,7 @@ namespace squint {
 /// The presets that round no wire: `real` in double, `float32` in float.
 bool rounds_nothing(std::string_view preset);
 
-/// What a preset composites with where the scene does not say.
+/// The compositing form of a preset, for a scene that names none.
 CompositingForm preset_form(std::string_view name);
 
 }  // namespace squint

@@ -1,4 +1,4 @@
-// What each setting of a scene may be, in words and as a check: one table for reading, messages and
+// What each setting of a scene may be, in words and as a check: one table serves reading, messages and
 // docs/scene.md.
 #pragma once
 
@@ -13,13 +13,13 @@
 
 namespace squint {
 
-/// A range of numbers; an end that is infinite is not mentioned.
+/// A range of numbers.  An infinite end is not mentioned in messages.
 struct Limits {
     std::string_view key;
     double low = -std::numeric_limits<double>::infinity();
     double high = std::numeric_limits<double>::infinity();
     bool low_open = false, high_open = false;
-    double also = std::numeric_limits<double>::quiet_NaN();  // one more value that is allowed
+    double also = std::numeric_limits<double>::quiet_NaN();  // one more allowed value
 
     bool hold(double value) const {
         if (value == also) return true;
@@ -28,13 +28,13 @@ struct Limits {
     std::string text() const;  // " above 0", " from 1 to 16384", or nothing
 };
 
-/// The limits of a setting's numbers; of each number where it holds several.
+/// The limits of a setting's number, or of each of its numbers.
 const Limits& limits_of(std::string_view key);
-/// The words a text setting may hold; empty where any text will do.
+/// The words that a text setting may hold; empty where any text is allowed.
 std::vector<std::string_view> words_of(std::string_view key);
-/// Whether "" stands for "not given" where words are listed.
+/// Whether "" means "not given" for a setting with a list of words.
 bool may_be_empty(std::string_view key);
-/// How many numbers a list setting holds: {1, 3} is one or three; empty where any number will do.
+/// How many numbers a list setting holds: {1, 3} is one or three; empty where any number is allowed.
 std::vector<std::size_t> counts_of(std::string_view key);
 
 template <class T>

@@ -1,4 +1,4 @@
-// Scene -> records and TOML; where settings were given, paths, and the built-in scene.
+// Writes scenes as records and TOML; finds where settings were given; expands paths; has the built-in scene.
 #include "scene/scene.h"
 
 #include "core/error.h"
@@ -103,7 +103,7 @@ Scene built_in_scene() {
     Scene scene;
     scene.name = "built-in scene";
     scene.volume.procedural = "phantom";  // 128^3 of 12 bits unless said otherwise
-    // The phantom's matter, in levels of 0 to 4095: skin 655, tissue 1310, bone 2252, brain 2948, vessels
+    // The phantom's matter, as levels of 0 to 4095: skin 655, tissue 1310, bone 2252, brain 2948, vessels
     // 3849.
     scene.transfer_function.points = {
         {300, 0.95, 0.55, 0.35, 0},      {560, 0.95, 0.55, 0.35, 0.045},  {800, 0.95, 0.45, 0.28, 0.045},

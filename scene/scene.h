@@ -1,5 +1,5 @@
-// A scene: everything that decides a picture.  Each setting is written once, in visit(): reading, help, the
-// record in the EXR and --set all walk that list.
+// A scene: everything that decides a picture.  Each setting is written once, in visit(): reading, help, --set
+// and the record in the EXR all walk that list.
 #pragma once
 
 #include "core/camera.h"
@@ -23,11 +23,11 @@ enum class InterpolationRule { trilinear, nearest };
 enum class GradientRule { central, central_samples, analytic, sobel };
 enum class Method { pc, pc_mid, pi2d, pi2d_no_attenuation, pi1d, pi1d_engel, pips, leg };
 enum class TableLookup { bilinear, nearest };
-enum class AlphaEncoding { alpha, sqrt_alpha };  // how the table stores opacity, in the format of table_alpha
+enum class AlphaEncoding { alpha, sqrt_alpha };  // how tables store opacity, in the format of table_alpha
 enum class ShadingModel { none, phong, blinn_phong, cone, gooch };
 enum class ConeSlope { energy, paper };
 enum class CoolSide { shadow, light };
-enum class InsideRule { mean, front, middle, adaptive };  // where inside a slab its light is taken
+enum class InsideRule { mean, front, middle, adaptive };  // where inside a slab its light is computed
 enum class PowerRule { squaring, parabola, table };
 enum class CompositingForm {
     automatic,
@@ -42,7 +42,7 @@ enum class CompositingForm {
 enum class CompositingMode { over, mip, minip, average };
 enum class LayoutRule { automatic, linear, cells };
 
-/// The names of an enumeration's values, in order.  Specialised below for each enumeration a scene can name.
+/// The names of an enumeration's values, in order.  Specialised below for each enumeration of a scene.
 template <class E>
 struct EnumNames;
 #define SQUINT_NAMES(E, ...)                                       \
@@ -73,7 +73,7 @@ constexpr std::string_view name_of(E value) {
     return EnumNames<E>::names[static_cast<std::size_t>(value)];
 }
 
-/// Two values, the first below the second; or the least and the greatest of the data; or nothing.
+/// Two ascending values, or the least and greatest of the data, or nothing.
 struct ValueRange {
     std::vector<double> ends;  // two, or none
     bool of_data = false;
@@ -83,82 +83,82 @@ struct TransferFunctionSettings {
     std::vector<std::vector<double>> points;   // [value, r, g, b, alpha]
     std::vector<std::vector<double>> color;    // [value, r, g, b]
     std::vector<std::vector<double>> opacity;  // [value, alpha]
-    std::string preset;                        // CT in HU, or one of the built-in scene's own
-    std::string file;                          // of another program: see FunctionFile
-    std::string map;                           // its name in a ParaView file of several
+    std::string preset;                        // CT in HU, or the built-in scene's
+    std::string file;                          // written by another program: see FunctionFile
+    std::string map;                           // which map of a ParaView file with several
     std::string color_space = "linear";        // or "srgb"
     double unit_distance = 0;                  // required with points or a ParaView file
     int entries = 0;                           // 0: one per level, at most 4096
-    ValueRange range;                          // where the points are stretched to
+    ValueRange range;                          // what the points are stretched to
 };
 
 struct ImageSettings {
     int width = 512, height = 512;
-    Vec3 background{0, 0, 0};  // of the preview only: EXR holds none
+    Vec3 background{0, 0, 0};  // of the preview only: the EXR has no background
 };
 
 struct SamplingSettings {
     double step = 1;                  // in units of the smallest voxel spacing
-    double termination = 1.0 / 1024;  // a ray ends at T below this; 0 never ends it early
+    double termination = 1.0 / 1024;  // a ray ends when T falls below this; 0: never early
     PositionRule position = PositionRule::p0_kv;
     InterpolationRule interpolation = InterpolationRule::trilinear;
 };
 
 struct ClipSettings {
-    std::optional<Vec3> low, high;  // a box in world units
+    std::optional<Vec3> low, high;  // opposite corners of a box, in world units
 };
 
 struct Light {
     bool headlight = false;
-    Vec3 direction{0, 0, 1};  // towards the light, world space; any length but zero
+    Vec3 direction{0, 0, 1};  // towards the light, in world space; any length but zero
     Vec3 color{1, 1, 1};
 };
 inline constexpr int kMostLights = 8;
 
 struct ShadingSettings {
-    ShadingModel model = ShadingModel::blinn_phong;  // absent where there is no light
+    ShadingModel model = ShadingModel::blinn_phong;  // none where there is no light
     GradientRule gradient = GradientRule::central;
     double ka = 0.25, kd = 0.6, ks = 0.15;
     double exponent = 32;
     PowerRule power = PowerRule::squaring;
     bool two_sided = false;
-    double gradient_floor = 0;  // levels per smallest voxel spacing; 0: light does not fade in
-    std::optional<InsideRule> inside = std::nullopt;  // absent: the best that the method has
+    double gradient_floor = 0;                        // levels per smallest voxel spacing; 0: no fading
+    std::optional<InsideRule> inside = std::nullopt;  // absent: the method's best
     ConeSlope cone_slope = ConeSlope::energy;
     CoolSide cool_side = CoolSide::shadow;
-    Vec3 cool{0, 0, 0.55}, warm{0.3, 0.3, 0};   // gooch: Gooch et al. 1998, as its own colours
-    double cool_share = 0.2, warm_share = 0.6;  // and how much of the matter's
+    Vec3 cool{0, 0, 0.55}, warm{0.3, 0.3, 0};   // gooch: its own tones (Gooch et al. 1998)
+    double cool_share = 0.2, warm_share = 0.6;  // and the matter's shares in them
 };
 
 struct ClassificationSettings {
     Method method = Method::pc;
     std::optional<int> order;  // n of pips and leg
-    int table_size = 256;      // of pi2d, a side
+    int table_size = 256;      // pi2d: nodes a side
     TableLookup lookup = TableLookup::bilinear;
     AlphaEncoding encoding = AlphaEncoding::alpha;
-    bool opaque_prediction = true;  // for experiments only: without it thin opaque surfaces are lost
+    bool opaque_prediction = true;  // experiments only: without it thin opaque surfaces are lost
 
-    /// The least that the method has, where none is given.
+    /// The order; where none is given, the least that the method has.
     int order_or_least() const { return order.value_or(method == Method::leg ? 2 : 1); }
 };
 
 struct CompositingSettings {
     CompositingMode mode = CompositingMode::over;
-    CompositingForm form = CompositingForm::automatic;  // what the precision preset composites with
+    CompositingForm form = CompositingForm::automatic;  // automatic: the precision preset's
 };
 
 struct OutputSettings {
-    bool depth = false;  // Z of the first hit and Z.mean, weighted by opacity; world units from the eye plane
+    bool depth = false;  // Z of the first hit, and Z.mean weighted by opacity; world units from the eye plane
     bool normals = false;       // N.x N.y N.z of the first hit
-    bool samples = false;       // samples composited
+    bool samples = false;       // slabs composited
     bool transparency = false;  // T
-    bool fixed = false;         // fixed.R ... : the raw words
+    bool fixed = false;         // fixed.R ...: raw words
 };
 
 struct PrecisionSettings {
     std::string preset = "default";  // default, squeeze, eight_bit, wide, real, float32, or a file
     std::array<std::optional<std::string>, kWires>
-        override_;  // "u1.15 trn sat", by wire; parts may be left out
+        override_;  // by wire: "u1.15 trn sat"; parts may be left out
 };
 
 struct Scene {
@@ -176,15 +176,15 @@ struct Scene {
     PrecisionSettings precision;
     std::string folder;  // paths in the scene are relative to it
 
-    // Not settings, for messages only: the file, and where each setting was given ("head.toml:7:1", "--set").
+    // Not settings, but for messages: the file, and where each setting was given ("head.toml:7:1", "--set").
     std::string name;
     std::map<std::string, std::string, std::less<>> given_at;
 };
 
-/// The same settings, as written; where they came from does not count.
+/// Compares the settings as written, not where they were given.
 bool operator==(const Scene& a, const Scene& b);
 
-/// Calls visit(key, setting, help) for every plain setting of a scene.  `lights` is a list of tables: see
+/// Calls visit(key, setting, help) for every plain setting of a scene.  `lights`, a list of tables, has
 /// visit_light().
 template <class S, class V>
 void visit_scene(S& scene, V&& visit) {
@@ -310,58 +310,58 @@ void visit_light(L& light, V&& visit) {
     visit("color", light.color, "linear colour");
 }
 
-/// The scene that is rendered when none is named: the phantom, skin and bone and vessels, one light.
+/// The scene rendered when none is named: the phantom with skin, bone and vessels, and one light.
 Scene built_in_scene();
 
-/// Reads a scene file, then `key=value` overrides in order (values as in TOML; bare words are strings).
-/// Throws InputError `file:line:column: what, what was found, what is allowed`.
+/// Reads a scene file, then `key=value` overrides in order (TOML values; bare words are strings).  Throws
+/// InputError `file:line:column: what, what was found, what is allowed`.
 Scene read_scene(const std::string& path, const std::vector<std::string>& overrides = {});
 Scene scene_with(Scene base, const std::vector<std::string>& overrides);
-/// The same from a text; `name` stands for the file in messages.
+/// The same from text; messages call it `name`.
 Scene parse_scene(std::string_view text, const std::string& name, const std::string& folder,
                   const std::vector<std::string>& overrides = {});
 
-/// Where a setting was given, to begin a message about it: "head.toml:7:8: sampling.step" or "--set
+/// Where a setting was given, for the beginning of a message: "head.toml:7:8: sampling.step" or "--set
 /// sampling.step".
 std::string where(const Scene& scene, std::string_view key);
 
-/// A path as written in a setting -> the path to open: ${VARIABLE} replaced from the environment, relative to
-/// `folder`. Throws InputError beginning with `setting` where a variable is unset or empty, or ${ is not
-/// closed.
+/// The path to open for a path as written in a setting: replaces ${VARIABLE} from the environment and takes
+/// it relative to `folder`.  Throws InputError beginning with `setting` where a variable is unset or empty,
+/// or ${ is not closed.
 std::string expand_path(const std::string& text, const std::string& folder, const std::string& setting);
-/// The volume's source with its path expanded, ready for load_volume().  The scene itself keeps the path as
-/// written: what is recorded names no folder of this machine.
+/// The volume's source with its path expanded, for load_volume().  The scene keeps the path as written: no
+/// record names a folder of this machine.
 VolumeSource volume_source(const Scene& scene);
 
 /// The built-in precision presets.
 inline constexpr std::string_view kPrecisionPresets[] = {"default", "squeeze", "eight_bit",
                                                          "wide",    "real",    "float32"};
-/// The precision with a preset file, if one is named, merged under the scene's own wires: `preset` is then a
-/// built-in one. A preset file is TOML with one table, [precision]: a built-in `preset` and wires.  Throws
-/// InputError.
+/// The precision settings with a preset file, where one is named, merged under the scene's own wires:
+/// `preset` is then a built-in one.  A preset file is TOML with one table, [precision]: a built-in `preset`,
+/// and wires. Throws InputError.
 PrecisionSettings resolved_precision(const Scene& scene);
 
-/// The whole scene as key -> TOML value, every key present ("auto" where absent): what EXR attributes and
-/// records hold. Each pair, joined by `=`, is an override that sets the same value again.
+/// The whole scene as key -> TOML value, with every key ("auto" where absent): for EXR attributes and
+/// records. Each pair, joined by `=`, is an override that sets the same value again.
 std::vector<std::pair<std::string, std::string>> resolved(const Scene& scene);
 /// A TOML file that reads back as the same scene.
 std::string to_toml(const Scene& scene);
 
-/// One line a setting: key, default, meaning.
+/// Help: a line a setting, with key, default and meaning.
 std::string scene_help();
-/// docs/scene.md: every key with its default, what is allowed and what it means.
+/// docs/scene.md: every key with its default, allowed values and meaning.
 std::string scene_reference_markdown();
 
 /// The scene's transfer function, from points, preset or file, stretched to `range` over the volume's values.
 /// Throws InputError.
 TransferFunction resolve_transfer_function(const Scene& scene, const Volume& volume);
-/// What a file of a transfer function is, by the end of its name.  Slicer's bring a unit distance.
+/// The program of a transfer function's file, by the end of its name.  Slicer's bring a unit distance.
 enum class FunctionFile { paraview, slicer_text, slicer_json, imagevis3d, unknown };
 FunctionFile function_file(std::string_view name);
 inline bool brings_unit_distance(FunctionFile file) {
     return file == FunctionFile::slicer_text || file == FunctionFile::slicer_json;
 }
-/// Names that `transfer_function.preset` knows: those of CT in HU, and `phantom` for the built-in volume.
+/// All names for `transfer_function.preset`: those of CT in HU, and `phantom` for the built-in volume.
 std::vector<std::string> transfer_function_presets();
 
 }  // namespace squint

@@ -1,4 +1,4 @@
-// Settings as TOML values: "auto" where one is absent.
+// Settings as TOML values: "auto" where a setting is absent.
 #pragma once
 
 #include "scene/scene.h"

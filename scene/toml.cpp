@@ -25,8 +25,8 @@ namespace {
 }  // namespace
 }  // namespace squint
 
-// toml++ 3.3 aborts on some texts ("[&") where its asserts are on, and drops them where NDEBUG is set: they
-// shall throw.
+// toml++ 3.3 aborts on some texts ("[&") where its asserts are on, and accepts them silently under NDEBUG:
+// here its asserts throw.
 #undef NDEBUG
 #define TOML_ASSERT(promise) ((promise) ? void() : ::squint::toml_promise_broken(#promise))
 #define TOML_EXCEPTIONS 1
@@ -98,8 +98,8 @@ void refuse_unsafe_bytes(std::string_view text, const std::string& name) {
     }
 }
 
-/// toml++ 3.3 is safe with ASCII alone: every other character goes through it as a name, `@0:fc;`, whose begin no
-/// text holds that has one.
+/// toml++ 3.3 is safe with ASCII alone.  Every other character goes through it as a name, `@0:fc;`, whose
+/// beginning occurs in no text.
 class AsciiText {
   public:
     explicit AsciiText(std::string_view text) {
@@ -128,7 +128,7 @@ class AsciiText {
         place(value.line, value.column), place(value.key_line, value.key_column);
         for (TomlValue& item : value.items) restore(item);
     }
-    /// Where a column of the ASCII text stands in the text itself.
+    /// Maps a column of the ASCII text to the column of the text itself.
     void place(int line, int& column) const {
         const auto first = std::lower_bound(names_.begin(), names_.end(), line,
                                             [](const Name& name, int at) { return name.line < at; });
@@ -138,7 +138,7 @@ class AsciiText {
 
   private:
     struct Name {
-        int line, column, more;  // columns that it takes beyond its character's
+        int line, column, more;  // extra columns of its name
     };
 
     void restore(std::string& value) const {
@@ -185,7 +185,7 @@ bool is_bare_key(std::string_view key) {
     });
 }
 
-/// Insertions, deletions, changes and swaps of neighbours that lead from a to b (optimal string alignment).
+/// Insertions, deletions, changes and swaps of neighbours from a to b (optimal string alignment).
 int edit_distance(std::string_view a, std::string_view b) {
     std::vector<int> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
     std::iota(last.begin(), last.end(), 0);
@@ -316,8 +316,8 @@ std::string in_quotes(std::string_view text) {
 }
 
 std::string_view nearest_name(std::string_view name, const std::vector<std::string_view>& candidates) {
-    // A third of the letters may be wrong: more is another word.  Half a word or more that was begun right
-    // counts as near.
+    // At most a third of the letters may differ.  Half of a word, rightly begun, counts as
+    // near.
     const int most = std::max(1, static_cast<int>(std::min<std::size_t>(name.size(), 64)) / 3);
     std::string_view best;
     int least = most + 1;

@@ -1,5 +1,5 @@
-// TOML text -> a tree of plain values that remember where they stood.  toml.cpp is the only file that
-// includes toml++.
+// Parses TOML text into a tree of plain values with their positions.  Only toml.cpp includes
+// toml++.
 #pragma once
 
 #include <cstdint>
@@ -12,39 +12,38 @@ namespace squint {
 struct TomlValue {
     enum class Kind { string, integer, number, boolean, date, list, table };
     Kind kind = Kind::table;
-    std::string text;  // of a string or a date
+    std::string text;  // of a string or date
     std::int64_t integer = 0;
-    double number = 0;  // of a number or an integer
+    double number = 0;  // of a number or integer
     bool flag = false;
-    std::vector<TomlValue>
-        items;        // of a list; of a table: its entries in the order of the text, each with a key
-    std::string key;  // of an entry of a table
+    std::vector<TomlValue> items;  // of a list; of a table: its entries with keys, in the order of the text
+    std::string key;               // of an entry of a table
     int key_line = 0, key_column = 0;
-    int line = 0, column = 0;  // from 1; 0 where there is no place, as for the whole text
+    int line = 0, column = 0;  // from 1; 0 where there is none
 
-    const TomlValue* find(std::string_view name) const;  // entry of a table, or null
+    const TomlValue* find(std::string_view name) const;  // a table's entry, or null
 };
 
-/// Parses a whole text in UTF-8.  Refuses control characters but tabs and line breaks.  Columns count characters.
-/// Throws InputError `name:line:column: ...`.
+/// Parses a text in UTF-8.  Refuses control characters except tabs and line breaks.  Columns count
+/// characters. Throws InputError `name:line:column: ...`.
 TomlValue parse_toml(std::string_view text, const std::string& name);
 
-/// Reads a file of at most 16 MiB and parses it.
+/// Reads a file of at most 16 MiB and parses it.  Throws InputError.
 TomlValue read_toml(const std::string& path);
 
-/// TOML for a value, on one line and in ASCII; reads back as the same value.
+/// A value as TOML, on one line and in ASCII; it reads back as the same value.
 std::string toml_text(double value);
 std::string toml_text(bool value);
 std::string toml_text(std::int64_t value);
 std::string toml_text(std::string_view value);
 std::string toml_text(const TomlValue& value);
 
-/// A value for messages: short, on one line.
+/// A value for messages: short and on one line.
 std::string described(const TomlValue& value);
-/// A text for messages: in quotes, short, on one line, in ASCII.
+/// A text for messages: in quotes, short, on one line and in ASCII.
 std::string in_quotes(std::string_view text);
 
-/// The candidate that `name` is most likely a slip of the keyboard for; empty if none is near.
+/// The candidate that `name` most likely misspells; empty if none is near.
 std::string_view nearest_name(std::string_view name, const std::vector<std::string_view>& candidates);
 /// "a, b or c".
 std::string listed(const std::vector<std::string_view>& names);

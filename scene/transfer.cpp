@@ -1,4 +1,4 @@
-// [transfer_function] -> TransferFunction.
+// Resolves [transfer_function] to a TransferFunction.
 #include "core/error.h"
 #include "core/srgb.h"
 #include "core/transfer_import.h"
@@ -62,7 +62,7 @@ TransferFunction from_file(const Scene& scene) {
     return import_paraview_json(path, settings.map, srgb, settings.unit_distance);
 }
 
-/// Moves the first and the last of all points to the ends of the scene's range.
+/// Moves the first and last of all points to the ends of the scene's range.
 void stretch(TransferFunction& function, const Scene& scene, const Volume& volume) {
     const ValueRange& range = scene.transfer_function.range;
     if (!range.of_data && range.ends.empty()) return;
@@ -116,7 +116,7 @@ TransferFunction resolve_transfer_function(const Scene& scene, const Volume& vol
         key = "transfer_function.file", function = from_file(scene);
     else
         key = settings.points.empty() ? "transfer_function.color" : key, function = from_lists(settings);
-    // A preset and a .vp file bring their own unit distance; the scene's replaces it.
+    // The scene's unit distance replaces that of a preset or a .vp file.
     if (settings.unit_distance > 0) function.unit_distance = settings.unit_distance;
     function.entries = settings.entries;
     function.name = where(scene, key);

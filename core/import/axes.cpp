@@ -9,9 +9,9 @@
 namespace squint {
 namespace {
 
-/// Off-axis part of a direction that counts as rounding: under a tenth of a voxel at 8,192 voxels.
+/// The off-axis part of a direction that counts as rounding: under a tenth of a voxel at 8,192 voxels.
 constexpr double kObliqueTolerance = 1e-5;
-/// Cosine of an angle that still counts as a right one: under a tenth of a voxel at 512 voxels.
+/// The cosine of an angle that counts as a right one: under a tenth of a voxel at 512 voxels.
 constexpr double kShearTolerance = 2e-4;
 constexpr double kDegrees = 57.29577951308232;
 
@@ -42,7 +42,7 @@ void check_steps(const StoredVolume& stored) {
         }
 }
 
-/// The axis of the file for each world axis: of all pairs not yet taken, the one that agrees most, three times.
+/// The file's axis for each world axis: three times, the free pair that agrees most.
 void choose_order(StoredVolume& stored) {
     std::array<bool, 3> axis_taken{}, world_taken{};
     for (int round = 0; round < 3; ++round) {

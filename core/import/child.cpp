@@ -30,13 +30,13 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMostHeader = std::size_t{1} << 20;
-/// Processor seconds of a reader: 4, and one more for every 16 MiB that the files hold (a gzip of them makes
-/// some 100 MiB of voxels a second).
+/// Processor seconds of a reader: 4, and one for every 16 MiB of its files (gzip of that size makes some 100
+/// MiB of voxels a second).
 constexpr std::int64_t kLeastSeconds = 4, kBytesPerSecond = std::int64_t{16} << 20;
-/// On a busy machine a reader may wait this much longer than it runs.
+/// How much longer than its processor time a reader may take on a busy machine.
 constexpr std::int64_t kWaits = 15;
 
-/// Owns a descriptor, moved above those that a child has for its own.
+/// Owns a descriptor, moved above those that a child uses itself.
 class Descriptor {
   public:
     explicit Descriptor(int number) : number_(number < 0 ? -1 : fcntl(number, F_DUPFD_CLOEXEC, 16)) {
@@ -55,7 +55,7 @@ class Descriptor {
     int number_;
 };
 
-/// Bytes of a file, or of all in a folder.
+/// The bytes of a file, or of all files in a folder.
 std::int64_t bytes_under(const std::string& path) {
     std::error_code error;
     if (!fs::is_directory(path, error)) return static_cast<std::int64_t>(fs::file_size(path, error));
@@ -68,7 +68,7 @@ std::int64_t bytes_under(const std::string& path) {
     return bytes;
 }
 
-/// A child that is waited for, and killed first where it still runs.
+/// A child that is waited for, and killed first if it still runs.
 class Child {
   public:
     Child(const std::vector<std::string>& words, int in, int out, int voxels) {
@@ -108,7 +108,7 @@ class Child {
     pid_t id_ = 0;
 };
 
-/// All that the child writes until it ends; false when the time is over or it writes too much.
+/// Reads all that the child writes until it ends; false when time is up or it writes too much.
 bool receive(int pipe, std::int64_t seconds, std::string& text) {
     using Clock = std::chrono::steady_clock;
     const auto deadline = Clock::now() + std::chrono::seconds(seconds);
@@ -137,10 +137,10 @@ std::string death_of(int status, std::int64_t seconds) {
     return fmt::format("ended with code {}", WEXITSTATUS(status));
 }
 
-/// The memory file's bytes, as memory of our own.
+/// Takes the bytes of the memory file as memory of our own.
 std::shared_ptr<unsigned char> take_voxels(int voxels, std::size_t size, const std::string& where) {
     struct stat status {};
-    // From here on nobody shrinks the file under us, whoever else may hold it.
+    // From here on no process can shrink the file under us.
     if (fcntl(voxels, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL) != 0 ||
         fstat(voxels, &status) != 0 || static_cast<std::size_t>(status.st_size) != size + kPaddingBytes)
         throw InputError(fmt::format("{}: its reader handed back {} bytes of voxels, but {} are needed",

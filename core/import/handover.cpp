@@ -19,7 +19,7 @@ constexpr std::size_t kLongestNote = 400;
     throw InputError(fmt::format("{}: its reader handed back no header of this version's", where));
 }
 
-/// Words of one line, taken one after the other.
+/// The words of a line, taken one after the other.
 class Words {
   public:
     Words(std::string_view line, const std::string& where) : rest_(line), where_(where) {}

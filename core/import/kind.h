@@ -5,8 +5,8 @@
 
 namespace squint {
 
-/// Whether a path names a volume, by its name or its first bytes: a folder, or a file of a kind that load_volume()
-/// reads; raw files by the extension .raw.
+/// Whether a path names a volume, by its name or its first bytes: a folder, or a file of a kind that
+/// load_volume() reads.  A raw file is known by the extension .raw.
 bool looks_like_volume(const std::string& path);
 
 }  // namespace squint

@@ -25,7 +25,7 @@ std::string_view trimmed(std::string_view text) {
                                            : text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
 }
 
-/// The header's keys.  Comments that name a patient are no keys of ours and are never looked at.
+/// The keys of the header.  Comments that may name a patient are never looked at.
 class Header {
   public:
     std::string path;
@@ -53,7 +53,7 @@ class Header {
                 end));
     }
 
-    /// The first of several names for one key that is there.
+    /// The first of several names of a key that is present.
     std::optional<std::string> text(std::initializer_list<const char*> names) const {
         for (const char* name : names)
             if (const auto found = keys_.find(name); found != keys_.end()) return found->second;
@@ -66,7 +66,7 @@ class Header {
             refuse(*names.begin(), *given, "True or False");
         return std::string_view("TtYy1").find((*given)[0]) != std::string_view::npos;
     }
-    /// Exactly `count` numbers; none where the key is absent.
+    /// Exactly `count` numbers; empty where the key is absent.
     template <class Number>
     std::vector<Number> numbers(std::initializer_list<const char*> names, std::size_t count) const {
         const auto given = text(names);

@@ -1,4 +1,4 @@
-// Voxels out of a file: mapped where they lie raw, otherwise inflated or read as text into memory of our own.
+// Voxels out of a file: mapped where they lie raw, otherwise inflated or parsed into memory of our own.
 #include "core/import/stored_bytes.h"
 
 #include "core/error.h"
@@ -33,10 +33,10 @@ class Inflater {
     Inflater(const Inflater&) = delete;
     Inflater& operator=(const Inflater&) = delete;
 
-    /// Whether the last member came to its end, its checksum and length right.
+    /// Whether the last member ended with the right checksum and length.
     bool whole() const { return whole_; }
 
-    /// Bytes written: fewer than `room` only where the data end.
+    /// Reads up to `room` bytes and returns how many: fewer only where the data end.
     std::size_t read(unsigned char* out, std::size_t room) {
         std::size_t done = 0;
         while (done < room && !ended_) {
@@ -78,14 +78,14 @@ class Inflater {
     bool ended_ = false, whole_ = false;
 };
 
-/// Room for all numbers of `stored`, its own.
+/// Allocates room for all numbers of `stored`.
 unsigned char* room_of(StoredVolume& stored, const std::string& where) {
     const std::shared_ptr<void> memory = allocate_voxels(stored.size(), where);
     stored.inflated = std::shared_ptr<unsigned char>(memory, static_cast<unsigned char*>(memory.get()));
     return stored.inflated.get();
 }
 
-/// Numbers separated by blanks or commas, as T in `out`; what was wrong, or nothing.
+/// Parses numbers separated by blanks or commas as T into `out`; returns what was wrong, or nothing.
 template <class T>
 std::string parse_numbers(const char* at, const char* end, std::size_t count, unsigned char* out) {
     const auto separates = [](char c) { return c == ' ' || c == ',' || (c >= '\t' && c <= '\r'); };
@@ -109,7 +109,7 @@ std::string parse_numbers(const char* at, const char* end, std::size_t count, un
 
 }  // namespace
 
-/// Bytes of a file as they may stand in a message: one line.
+/// Bytes of a file made fit for a message: one line.
 std::string data_path(const std::string& path, const std::string& name) {
     const std::filesystem::path data(name);
     if (name == "LIST" || name.starts_with("LIST ") || name.find('%') != std::string::npos)
@@ -129,7 +129,7 @@ std::string data_path(const std::string& path, const std::string& name) {
             "{}: data file is \"{}\", a link to elsewhere, but only files in the header's own folder "
             "or below are allowed: put the header beside the file that the link leads to",
             path, excerpt(name)));
-    return file.string();  // where there is none, opening it says so
+    return file.string();  // if it does not exist, opening it says so
 }
 
 void take_mapped(StoredVolume& stored, const MappedFile& file, std::size_t offset, const std::string& where) {
@@ -139,7 +139,7 @@ void take_mapped(StoredVolume& stored, const MappedFile& file, std::size_t offse
                                      offset ? fmt::format(" after the first {}", offset) : "", needs(stored),
                                      there > stored.size() ? ": oversized" : ""));
     stored.bytes = std::shared_ptr<const unsigned char>(file.bytes, file.bytes.get() + offset);
-    // Whole voxels of each hole.
+    // Only the whole voxels of each hole.
     const std::size_t width = bytes_of(stored.type);
     for (const ByteRun& hole : file.holes) {
         const std::size_t first = (std::max(hole.first, offset) - offset + width - 1) / width,
@@ -183,7 +183,7 @@ void take_inflated(StoredVolume& stored, const MappedFile& file, std::size_t off
 void take_ascii(StoredVolume& stored, const MappedFile& file, std::size_t offset, const LoadLimits& limits,
                 const std::string& where) {
     const std::size_t count = stored.size() / bytes_of(stored.type);
-    if (count > (file.size - offset + 1) / 2)  // a digit and a blank each
+    if (count > (file.size - offset + 1) / 2)  // each number has a digit and a blank at least
         throw InputError(fmt::format("{}: {} bytes of text hold at most {} numbers, but {}", where,
                                      file.size - offset, (file.size - offset + 1) / 2, needs(stored)));
     check_memory(stored.size(), stored, limits);

@@ -1,29 +1,29 @@
-// Voxels out of a file, for the readers of volumes only.
+// Reads voxels out of a file.  Only for readers of volumes.
 #pragma once
 
 #include "core/volume_stored.h"
 
 namespace squint {
 
-/// The data file beside a header.  A header from elsewhere must not make us read any file it likes: throws
-/// InputError for one outside the header's folder.
+/// The data file of a header.  Throws InputError for a file outside the header's folder: a header must not
+/// make us read any file it likes.
 std::string data_path(const std::string& path, const std::string& name);
 
-/// `file` from byte `offset` on must hold exactly the voxels of `stored`, which stay where they are.
+/// Maps voxels: `file` from byte `offset` on must hold exactly those of `stored`, which stay in place.
 void take_mapped(StoredVolume& stored, const MappedFile& file, std::size_t offset, const std::string& where);
 
-/// The voxels are the gzip or zlib data in `packed` bytes from `offset` on, after `skip` inflated ones.
+/// Inflates voxels: gzip or zlib data in `packed` bytes from `offset` on, after `skip` inflated ones.
 void take_inflated(StoredVolume& stored, const MappedFile& file, std::size_t offset, std::size_t packed,
                    std::size_t skip, const LoadLimits& limits, const std::string& where);
 
-/// The voxels are numbers written as text, from byte `offset` to the end.
+/// Parses voxels that are numbers written as text, from byte `offset` to the end.
 void take_ascii(StoredVolume& stored, const MappedFile& file, std::size_t offset, const LoadLimits& limits,
                 const std::string& where);
 
-/// `count` numbers a voxel, `run` numbers between two of the same voxel.
+/// Notes components: `count` numbers a voxel, `run` numbers apart.
 void take_components(StoredVolume& stored, std::int64_t count, std::int64_t run);
 
-/// The component that the source names.  Throws InputError: several, and none is named.
+/// Chooses the component that the source names.  Throws InputError where there are several and none is named.
 void choose_component(StoredVolume& stored, const VolumeSource& source);
 
 }  // namespace squint

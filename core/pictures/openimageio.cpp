@@ -16,10 +16,10 @@ namespace {
 
 constexpr std::uint64_t kMostValues = std::uint64_t{1}
                                       << 31;  // width * height * channels of a file we agree to read
-constexpr std::uint64_t kMostUnasked = std::uint64_t{1} << 22;  // as many without a look at the file's size
-constexpr std::uint64_t kMostValuesPerByte = 1032;              // deflate makes as many bytes of one
+constexpr std::uint64_t kMostUnasked = std::uint64_t{1} << 22;  // as many without checking the file's size
+constexpr std::uint64_t kMostValuesPerByte = 1032;              // deflate makes at most so many
 
-/// Messages of the library in one line.
+/// The library's messages, joined into one line.
 std::string one_line(std::string text) {
     while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back()))) text.pop_back();
     for (char& c : text)
@@ -27,7 +27,7 @@ std::string one_line(std::string text) {
     return text;
 }
 
-/// The name that OpenImageIO has for the files of this extension; empty if it knows none.
+/// OpenImageIO's name for files of this extension; empty if it knows none.
 std::string format_of(const std::string& path) {
     std::string extension = std::filesystem::path(path).extension().string();
     std::transform(extension.begin(), extension.end(), extension.begin(),
@@ -51,7 +51,7 @@ OIIO::TypeDesc type_of(Packed::Type type) {
     return OIIO::TypeDesc::FLOAT;
 }
 
-/// Encoded in memory: OpenImageIO's PNG writer does not notice a full disk.
+/// Encodes in memory, because OpenImageIO's PNG writer does not notice a full disk.
 std::string encode(const Packed& picture, const std::string& path) {
     OIIO::ImageSpec spec(picture.width, picture.height, static_cast<int>(picture.channels.size()),
                          type_of(picture.channels.front().type));
@@ -68,7 +68,7 @@ std::string encode(const Packed& picture, const std::string& path) {
     if (!output || !output->set_ioproxy(&encoded))
         throw InputError(
             fmt::format("{}: cannot write, OpenImageIO has no writer for {}", path, picture.format));
-    // UNKNOWN: each channel in its own type
+    // UNKNOWN: each channel keeps its type
     if (!output->open(path, spec) || !output->write_image(OIIO::TypeDesc::UNKNOWN, picture.data) ||
         !output->close())
         throw InputError(fmt::format("{}: cannot write: {}", path, one_line(output->geterror())));
@@ -96,7 +96,7 @@ std::unique_ptr<OIIO::ImageInput> open(const std::string& path) {
     return input;
 }
 
-/// Refuses what a header claims before memory is asked for.
+/// Refuses what a header claims before memory is allocated for it.
 void check_spec(const OIIO::ImageSpec& spec, const std::string& path) {
     std::error_code ignored;
     if (spec.deep || spec.depth > 1) throw InputError(path + ": deep or volume image, allowed is a flat one");

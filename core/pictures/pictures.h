@@ -1,5 +1,5 @@
-// What reads and writes picture files: a module of its own, for OpenImageIO brings 250 libraries along, a quarter
-// of a second and 100 MB a start.  It is loaded when the first picture is read or written.
+// Reads and writes picture files in a module, loaded with the first picture: OpenImageIO brings 250
+// libraries, which cost a quarter of a second and 100 MB at every start.
 #pragma once
 
 #include "core/image.h"
@@ -9,7 +9,7 @@
 
 namespace squint::pictures {
 
-/// A picture as its file shall hold it.
+/// A picture as it goes into a file.
 struct Packed {
     enum class Type { u8, u32, f32 };
     struct PackedChannel {
@@ -24,7 +24,7 @@ struct Packed {
     std::vector<std::pair<std::string, int>> settings;  // of its encoder
 };
 
-/// One picture of a file as it is stored there.
+/// One picture of a file as it is stored.
 struct Page {
     enum class Type { u8, i8, u16, i16, u32, i32, f32, f64 };
     int width = 0, height = 0, channels = 0;
@@ -32,7 +32,7 @@ struct Page {
     std::vector<unsigned char> bytes;  // [row, column, channel], in this machine's order
 };
 
-/// What the module offers.  Its functions throw InputError, beginning with `path`.
+/// The functions of the module.  They throw InputError, beginning with `path`.
 struct Codec {
     int version;                                                            // of OpenImageIO: 20407 is 2.4.7
     std::string (*encode)(const Packed& picture, const std::string& path);  // -> the file's bytes
@@ -42,11 +42,11 @@ struct Codec {
                       int page);  // counted from 0; codes, neither scaled nor decoded
 };
 
-/// The module, loaded by the first call: from beside the program in the build tree, from the library folder of an
-/// installation.  Throws InputError if it is not there.
+/// Loads the module on the first call: from beside the program in the build tree, or from an installation's
+/// library folder.  Throws InputError if it is not there.
 const Codec& codec();
 
-/// The module's one symbol: a function `const Codec* squint_picture_codec()`.
+/// The only symbol of the module: a function `const Codec* squint_picture_codec()`.
 inline constexpr const char* kFile = "libsquint_pictures.so";
 inline constexpr const char* kSymbol = "squint_picture_codec";
 

@@ -1,5 +1,5 @@
-// A DICOM series by DCMTK: slices sorted by position, one rescale for all.  Of a file's attributes only those that say
-// how voxels lie and what they mean are looked at: nothing that names a person or a date leaves this process.
+// Reads a DICOM series with DCMTK: slices sorted by position, one rescale for all.  Looks only at the
+// attributes that say how voxels lie and what they mean: no name of a person and no date leaves this process.
 #include "core/error.h"
 #include "core/import/axes.h"
 #include "core/import/read/readers.h"
@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMostFiles = 20000;
 constexpr int kDeepest = 4;  // folders in folders
-/// Places and directions are written with some six digits; a gap of a twentieth of a slice is none.
+/// Positions and directions have some six digits: gaps of a twentieth of a slice are rounding.
 constexpr double kSameDirection = 1e-4, kSamePlace = 1e-3, kGap = 0.05;
 
 struct Slice {
@@ -87,7 +87,7 @@ long whole(DcmItem& data, const DcmTagKey& tag, long otherwise) {
     Uint16 small = 0;
     return data.findAndGetUint16(tag, small).good() ? small : otherwise;
 }
-/// As many decimal numbers as `count`, all finite; nothing where they are not there.
+/// `count` finite decimal numbers; empty where they are absent.
 std::vector<double> numbers(DcmItem& data, const DcmTagKey& tag, unsigned long count) {
     std::vector<double> list;
     for (unsigned long i = 0; i < count; ++i) {
@@ -173,7 +173,7 @@ std::vector<Slice> series_of(const Request& request) {
         request.series > 0 ? fmt::format("no series {}: ", request.series) : "", all.size(), list));
 }
 
-/// Refuses what no volume can be made of; all slices alike.
+/// Refuses slices of which no volume can be made: all must be alike.
 void check_alike(const std::vector<Slice>& slices, const std::string& where) {
     const Slice& a = slices[0];
     if (a.samples != 1)
@@ -206,7 +206,7 @@ void check_alike(const std::vector<Slice>& slices, const std::string& where) {
     }
 }
 
-/// Several slices at each place, as of times or echoes: the one asked for of each, by instance number.
+/// Several slices at each place, as of times or echoes: takes the one asked for, by instance number.
 std::vector<Slice> one_a_place(std::vector<Slice> slices, const Request& request, bool& of_several) {
     std::vector<std::vector<Slice>> places;
     for (Slice& slice : slices) {
@@ -231,7 +231,7 @@ std::vector<Slice> one_a_place(std::vector<Slice> slices, const Request& request
     return chosen;
 }
 
-/// From the first slice to the last: evenly spaced, or refused with the gap.
+/// The step from slice to slice; refuses uneven ones and says where the gap is.
 Vec3 slice_step(const std::vector<Slice>& slices, Handover& h) {
     const Slice& a = slices[0];
     const std::string& where = h.stored.where;
@@ -326,7 +326,7 @@ double number_at(const unsigned char* bytes, StoredType type) {
     }
 }
 
-/// All slices one after the other; where each has a rescale of its own, as float values.
+/// All slices one after the other; as float values where each has a rescale of its own.
 void read_all(const std::vector<Slice>& slices, Handover& h, const LoadLimits& limits) {
     StoredVolume& stored = h.stored;
     const Slice& a = slices[0];
@@ -334,7 +334,7 @@ void read_all(const std::vector<Slice>& slices, Handover& h, const LoadLimits& l
     const bool one_scale = std::all_of(slices.begin(), slices.end(), [&](const Slice& s) {
         return s.slope == a.slope && s.intercept == a.intercept;
     });
-    // Whole values of 16 bits, as CT's: the rescale is done, and the file's numbers are the values.
+    // 16-bit integer values, as in CT: the rescale is applied, and the numbers are the values.
     const double least = a.is_signed ? -std::ldexp(1, a.stored - 1) : 0,
                  most = std::ldexp(1, a.is_signed ? a.stored - 1 : a.stored) - 1;
     const bool whole = one_scale && a.slope == 1 && a.intercept == std::floor(a.intercept) &&
@@ -346,7 +346,7 @@ void read_all(const std::vector<Slice>& slices, Handover& h, const LoadLimits& l
     std::error_code error;
     std::size_t there = 0;
     for (const Slice& s : slices) there += static_cast<std::size_t>(fs::file_size(s.path, error));
-    if (stored.voxels() / 1024 > there)  // the best of its codecs packs less
+    if (stored.voxels() / 1024 > there)  // its best codec packs less than that
         throw InputError(
             fmt::format("{}: {} bytes hold no {} voxels", stored.where, there, squint::text_of(stored.dims)));
     unsigned char* out = room_for(stored, limits);

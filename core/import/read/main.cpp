@@ -1,5 +1,5 @@
-// squint-read KIND PATH MAX_BYTES SECONDS SERIES COMPONENT: reads a file with somebody else's parser, under limits,
-// and hands back a header on standard output and the voxels in the memory file that is descriptor 3.
+// squint-read KIND PATH MAX_BYTES SECONDS SERIES COMPONENT: reads a file with another project's parser, under
+// limits.  Returns a header on standard output and the voxels in the memory file, descriptor 3.
 #include "core/error.h"
 #include "core/import/read/readers.h"
 
@@ -18,7 +18,7 @@
 namespace squint::read {
 namespace {
 
-/// Memory of a parser's own: slices, tables, what it builds of a header.  Voxels are not in it.
+/// Memory of the parser itself, for slices, tables and headers.  Voxels are not part of it.
 constexpr rlim_t kParserBytes = rlim_t{2} << 30;
 constexpr rlim_t kOpenFiles = 64;
 
@@ -27,7 +27,7 @@ void limit(__rlimit_resource what, rlim_t most) {
     setrlimit(what, &limits);
 }
 
-/// No more memory, time and files than a file of voxels needs; no core is written, and no file but the memory's.
+/// Limits memory, time and files to what a file of voxels needs: no core dump, no file but the memory file.
 void limit_all(const LoadLimits& limits, rlim_t seconds) {
     const auto machine =
         static_cast<rlim_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<rlim_t>(sysconf(_SC_PAGESIZE));

@@ -1,4 +1,4 @@
-// NIfTI 1 and 2 (.nii, .nii.gz, .hdr with .img): the header by libnifti, the voxels by zlib.
+// Reads NIfTI 1 and 2 (.nii, .nii.gz, .hdr with .img): libnifti parses the header, zlib inflates the voxels.
 #include "core/error.h"
 #include "core/import/axes.h"
 #include "core/import/read/readers.h"
@@ -54,7 +54,7 @@ void take_type_and_dims(StoredVolume& stored, const nifti_image& image) {
     stored.component_run = others > 1 ? static_cast<std::int64_t>(stored.voxels()) : 1;
 }
 
-/// World from voxel by the s form, else the q form, else the spacing alone; RAS is turned into LPS.
+/// World from voxel, by the s form, or the q form, or the spacing alone; turns RAS into LPS.
 void take_geometry(Handover& h, const nifti_image& image) {
     const bool s_form = image.sform_code > 0, q_form = image.qform_code > 0;
     for (int axis = 0; axis < 3; ++axis)

@@ -1,4 +1,4 @@
-// A stack of pictures: a folder of TIFF or PNG files in the order of their numbers, or a TIFF of several pages.
+// Reads a stack of pictures: a folder of TIFF or PNG in the order of their numbers, or a TIFF of many pages.
 #include "core/pictures/pictures.h"
 #include "core/error.h"
 #include "core/import/read/readers.h"
@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMostFiles = 65536;
 
-/// "slice9" before "slice10": runs of digits count as the numbers they are.
+/// Compares names so that "slice9" comes before "slice10": runs of digits count as numbers.
 bool before(const std::string& a, const std::string& b) {
     const auto digit = [](char c) { return c >= '0' && c <= '9'; };
     std::size_t i = 0, j = 0;

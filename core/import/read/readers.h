@@ -1,4 +1,4 @@
-// The readers of squint-read, one a kind of file.
+// The readers of squint-read, one for each kind of file.
 #pragma once
 
 #include "core/import/handover.h"
@@ -8,7 +8,7 @@
 
 namespace squint::read {
 
-/// What was asked for.
+/// What the library asks a reader for.
 struct Request {
     std::string path;
     LoadLimits limits;
@@ -16,10 +16,10 @@ struct Request {
     int component = -1;  // of DICOM with several slices at each place; -1: none was named
 };
 
-/// Room for the voxels of `stored` in the memory file.  Throws InputError beyond the limits.
+/// Allocates the voxels of `stored` in the memory file.  Throws InputError beyond the limits.
 unsigned char* room_for(const StoredVolume& stored, const LoadLimits& limits);
 
-/// Each fills in the header and writes the voxels into room_for() it.  Throws InputError.
+/// Each returns the header and writes the voxels into room_for() it.  Throws InputError.
 Handover read_dicom(const Request& request);
 Handover read_nifti(const Request& request);
 Handover read_vti(const Request& request);

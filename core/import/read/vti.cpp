@@ -1,4 +1,4 @@
-// VTK's ImageData in XML (.vti): the header by pugixml; text, base64 or appended raw data, plain or zlib in blocks.
+// Reads VTK's ImageData (.vti) with pugixml: text, base64 or appended raw data, plain or zlib in blocks.
 #include "core/error.h"
 #include "core/import/read/readers.h"
 
@@ -56,7 +56,7 @@ std::string from_base64(std::string_view text, std::size_t most, const std::stri
         for (const int shift : {10, 2}) bytes.push_back(static_cast<char>(word >> shift & 0xff));
     return bytes;
 }
-/// Digits of base64 that hold `bytes` whole.
+/// The digits of base64 that hold `bytes`.
 std::size_t base64_length(std::size_t bytes) {
     return (bytes + 2) / 3 * 4;
 }
@@ -94,7 +94,7 @@ struct Encoded {
             std::memcpy(out, all.data() + width, size);
             return;
         }
-        // Blocks, bytes of a block, bytes of the last one (0: whole), then the packed bytes of each.
+        // The number of blocks, a block's bytes, the last one's (0: whole), then each one's packed bytes.
         const std::string first = decoded(text, 3 * width, where);
         const std::uint64_t blocks = count_at(first, 0, where), whole = count_at(first, 1, where);
         if (blocks > text.size() || whole > size + (std::uint64_t{1} << 30))
@@ -141,7 +141,7 @@ constexpr std::pair<std::string_view, StoredType> kTypes[] = {
     {"Float64", StoredType::f64},
 };
 
-/// The array named by Scalars, else the first.
+/// The array that Scalars names, or else the first.
 pugi::xml_node array_of(const pugi::xml_node& piece, bool& of_cells, Handover& h) {
     for (const char* kind : {"PointData", "CellData"}) {
         const pugi::xml_node data = piece.child(kind);
@@ -160,7 +160,7 @@ pugi::xml_node array_of(const pugi::xml_node& piece, bool& of_cells, Handover& h
     refuse(h.stored.where, "no DataArray in PointData or CellData");
 }
 
-/// Voxels of points, or of cells: then half a step inwards, and one fewer along each axis.
+/// The voxels are points, or cells: these lie half a step inwards, one fewer along each axis.
 void take_geometry(Handover& h, const pugi::xml_node& image, const pugi::xml_node& piece, bool of_cells) {
     const std::string& where = h.stored.where;
     const auto extent = numbers<std::int64_t, 6>(
@@ -191,7 +191,7 @@ Handover read_vti(const Request& request) {
     const MappedFile file = map_file(where);
     if (file.size > kMostText) refuse(where, "more than 2 GiB of XML");
     const std::string_view text(reinterpret_cast<const char*>(file.bytes.get()), file.size);
-    // Appended raw data are no XML: what stands before them is parsed alone.
+    // Appended raw data are no XML: only what stands before them is parsed.
     const std::size_t appended = text.find("<AppendedData");
     std::string xml(text.substr(0, appended));
     if (appended != std::string_view::npos) xml += "</VTKFile>";
