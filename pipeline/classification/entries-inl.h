@@ -39,14 +39,14 @@ HWY_INLINE W opacity_of_depth(const OpacityUnit& unit, W depth) {
         blend(gather(unit.rows, row, 0), gather(unit.rows, row + constant<W>(1), 0), rest, fraction),
         unit.to_alpha);
 }
-/// 1 - exp(-x) for x >= 0 in float32: -x = n ln 2 + r, |r| <= ln 2 / 2, exp(r) - 1 by its series to r^7,
-/// which is 2^-26 of r off at most.
+/// 1 - exp(-x) for x >= 0 in float32.  With -x = n ln 2 + r, |r| <= ln 2 / 2, exp(r) - 1 is its series to
+/// r^7, which is off by at most 2^-26 of r.
 template <RealWord W>
 HWY_INLINE W one_minus_exp(W x) {
     const auto k = [](double value) { return W::from(value); };
-    const W y = k(0) - min(x, k(80));  // opaque to the last bit, and 2^n in range
+    const W y = k(0) - min(x, k(80));  // opaque to the last bit there; keeps 2^n in range
     const W n = floor_shift(y * k(1.44269504088896341) + k(0.5), 0);
-    // ln 2 in two parts, the first with bits to spare for n.
+    // ln 2 in two parts; n times the first is exact.
     const W r = (y - n * k(0x1.62ep-1)) - n * k(0x1.0bfbe8e7bcd5ep-15);
     const W tail =
         k(1.0 / 6) + r * (k(1.0 / 24) + r * (k(1.0 / 120) + r * (k(1.0 / 720) + r * k(1.0 / 5040))));
@@ -65,7 +65,7 @@ HWY_INLINE W opacity_of_depth(const OpacityUnit& unit, W depth) {
                     raw);
 }
 
-/// Where an input stands between two entries.
+/// The position of an input between two entries.
 template <class W>
 struct EntryPosition {
     W entry, fraction;
@@ -77,7 +77,7 @@ HWY_INLINE EntryPosition<W> entry_position(const EntrySpacing& e, W input) {
     return {entry, within(min(input - shift_left(entry, e.input_fraction), constant<W>(one)), 0, one)};
 }
 
-/// Where an input stands between two of 2^bits rows an entry.
+/// The position of an input between two rows, 2^bits rows an entry.
 template <class W>
 HWY_INLINE EntryPosition<W> sub_entry_position(const EntrySpacing& e, int sub_entry_bits, W input) {
     const int bits = e.input_fraction - sub_entry_bits;
@@ -87,7 +87,7 @@ HWY_INLINE EntryPosition<W> sub_entry_position(const EntrySpacing& e, int sub_en
     return {entry, within(min(input - shift_left(entry, bits), constant<W>(one)), 0, one)};
 }
 
-/// One where a position is opaque: on an opaque entry, or between two (docs/conventions.md).
+/// One where a position is opaque: on an opaque entry, or between two of them (docs/conventions.md).
 template <class W>
 HWY_INLINE auto is_opaque(const EntryLookup& e, const EntryPosition<W>& at) {
     const W zero = constant<W>(0), one = constant<W>(std::int64_t{1} << e.input_fraction);
@@ -99,7 +99,7 @@ HWY_INLINE auto is_opaque(const EntryLookup& e, const EntryPosition<W>& at) {
            ((at.fraction == one) & (zero < next_bit));
 }
 
-/// Between rows `row` and `row + 1` of a table of four columns: red, green, blue, alpha.
+/// Interpolates between rows `row` and `row + 1` of a table with four columns: red, green, blue, alpha.
 template <class W>
 HWY_INLINE std::array<W, 4> lerp_rows(const Table& table, W row, W weight, int weight_bits,
                                       const Rescale& to_color, const Rescale& to_alpha) {
@@ -111,13 +111,13 @@ HWY_INLINE std::array<W, 4> lerp_rows(const Table& table, W row, W weight, int w
     return between;
 }
 
-/// A full step's depth times the length of a slab, exact, then rounded once.
+/// The depth of a full step times the length of a slab, exact, then rounded once.
 template <class W>
 HWY_INLINE W shortened(W depth, W length, int length_fraction, const Rescale& to_shorter) {
     return quotient(wide_product(depth, length), widen(constant<W>(std::int64_t{1} << length_fraction)),
                     to_shorter);
 }
-/// The optical depth of a point, extinction linear between entries, over `length` steps.
+/// The optical depth of a point over `length` steps; extinction is linear between entries.
 template <class W>
 HWY_INLINE W point_depth(const EntryLookup& e, const EntryPosition<W>& at, W length) {
     const W next = gather(e.matter, at.entry + constant<W>(1), EntryLookup::extinction);
@@ -127,8 +127,8 @@ HWY_INLINE W point_depth(const EntryLookup& e, const EntryPosition<W>& at, W len
     return shortened(full, length, e.length_fraction, e.to_shorter);
 }
 
-/// The function at one point, for a slab of `length` steps (post-classification; every method where both ends
-/// are equal).
+/// Classifies one point for a slab of `length` steps: post-classification, and every method where both ends
+/// are equal.
 template <class W>
 HWY_INLINE Slab<W> classify_point(const EntryLookup& e, W input, W length) {
     const EntryPosition<W> row = sub_entry_position(e, e.row_bits, input);
@@ -147,7 +147,7 @@ HWY_INLINE Slab<W> classify_point(const EntryLookup& e, W input, W length) {
     if (may_be_opaque)
         slab.alpha = select(is_opaque(e, entry_position(e, input)), constant<W>(e.one_alpha), slab.alpha);
     if constexpr (std::is_same_v<W, Real<double>>) {
-        // Without rounding: the exact opacity, not a table's rows.
+        // Without rounding: the exact opacity in place of a table's rows.
         if (!e.table.active) {
             const EntryPosition<W> at = entry_position(e, input);
             slab.alpha = opacity_of_depth(e.opacity, point_depth(e, at, length));

@@ -16,8 +16,8 @@
 namespace squint {
 namespace {
 
-// An alpha as the table's word gives it back.  sqrt(alpha) is stored in F bits and expanded, c + (c >> (F -
-// 1)), so that 0 and 1 are exact; the square has 2 F fraction bits (Squeeze, section 4.4.2, as corrected).
+// An alpha as it comes back from the table's word.  sqrt(alpha) is stored in F bits and expanded to c + (c >>
+// (F - 1)), so that 0 and 1 are exact; the square has 2 F fraction bits (Squeeze 4.4.2, as corrected).
 double decoded_alpha(double alpha, const Spec& spec, AlphaEncoding encoding) {
     if (encoding == AlphaEncoding::alpha) return alpha;
     const int f = spec.format.fraction_bits;
@@ -32,10 +32,10 @@ double decoded_alpha(double alpha, const Spec& spec, AlphaEncoding encoding) {
 std::vector<WireFormats> classification_wires(const PresetInputs& in) {
     constexpr Rounding trn = Rounding::trn;
     const int sum = accumulating_bits(in), wide_sum = wide_accumulating_bits(in), total = in.total_depth_bits;
-    // One entry's depth times an input's 8 fraction bits fits 32, too, where the sums' 15 bits do.
+    // Where the sums have 15 bits, an entry's depth times an input's 8 fraction bits must fit 32, too.
     const int depth = sum > 15 ? sum + 1 : std::min(20, 23 - in.depth_bits);
-    // A full step's depth, before a shorter slab takes its part of it: all of it must fit.  Deep steps take
-    // their integer bits from two spare fraction bits first, which 32-bit lanes multiply as before.
+    // Before a short slab takes its part, the full step's depth must fit.  Deep steps take their integer bits
+    // from two spare fraction bits first; 32-bit lanes then multiply as before.
     const int deep = std::max(4, in.depth_bits);
     const auto sums = [&](Wire wire) -> WireFormats {
         return {wire, unsigned_spec(total, std::min(depth, held(31 - total)), kToEven),
@@ -68,7 +68,7 @@ InputStage build_input(const StageInputs& in) {
     InputStage s;
     s.scaled = in.entries.scalars_per_entry != 1;
     s.scale_exact = 1 / in.entries.scalars_per_entry;
-    // Entries per level with 20 significant bits.
+    // Entries per level, with 20 significant bits.
     s.scale_fraction = s.scaled ? std::clamp(20 - bits_for(s.scale_exact) +
                                                  std::max(0, bits_for(in.entries.scalars_per_entry) - 1),
                                              0, 36)
@@ -123,7 +123,7 @@ OpacityUnit computed_opacity_unit(const WireSpecs& specs) {
 }  // namespace
 
 OpacityUnit build_opacity_unit(const WireSpecs& specs, double longest_ray) {
-    // It knows nothing of the transfer function, and copies share their rows: the last few formats are kept.
+    // The rows do not depend on the transfer function: those of the last few formats are kept and shared.
     struct Kept {
         Spec depth, alpha;
         OpacityUnit unit;
@@ -149,14 +149,14 @@ double lost_along_ray(double error, double least, double longest) {
 }
 
 Approximation OpacityUnit::error() const {
-    // Of a depth x below a row h the line loses x h / 2 at most, h^2 / 8 of any; x e^-x is 1 / e at most.
+    // At a depth x below a row h the line loses at most x h / 2, never more than h^2 / 8; x e^-x <= 1 / e.
     const double h = std::ldexp(1.0, -row_bits);
     return {"1 - exp(-x) between its rows", 255 * std::min(longest_ray * h * h / 8, h / 2 * 0.36788)};
 }
 
 EntryRows rows_for_opacity(const ClassificationInputs& in) {
-    // Between rows d apart in depth, x deep and more, an opacity is d^2 / 8 above its chord at most; d / 2 of
-    // its depth at most, where rows begin at nothing.
+    // Between rows d apart in depth, at a depth x or more, an opacity is at most d^2 / 8 above its chord;
+    // where rows begin at zero, at most d / 2 of its depth.
     const auto lost = [&](int bits) {
         double worst = 0;
         for (int i = 0; i + 1 < in.entries.size(); ++i) {
@@ -218,7 +218,7 @@ EntryLookup build_entry_lookup(const ClassificationInputs& in) {
     lookup.matter.last_wire = -1;  // flags
     lookup.input_fraction = in.input_fraction;
     lookup.last_segment = n - 2;
-    // The square of an F-bit root has 2 F bits; a plain alpha has its own F.
+    // The square of a root of F bits has 2 F bits; a plain alpha has its own F.
     const bool rooted = in.settings.encoding == AlphaEncoding::sqrt_alpha;
     if (rooted && alpha.format.fraction_bits == 0)
         throw InputError(

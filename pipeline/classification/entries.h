@@ -1,5 +1,5 @@
-// What every classification shares: the entries' own table, linear between entries, and the unit that turns
-// an optical depth into an opacity.
+// What every classification shares: the table of entries, linear between them, and the unit that turns an
+// optical depth into an opacity.
 #pragma once
 
 #include "core/portable_math.h"
@@ -23,15 +23,15 @@ struct TableReport {
     std::int64_t rows = 0, columns = 0, bytes = 0;
     std::string note;
 };
-/// What tables leave out: at most `lsb8` of 255 in all, along the scene's longest ray.
+/// The error of an approximation in tables: at most `lsb8` of 255 in all, along the scene's longest ray.
 struct Approximation {
     std::string of;
     double lsb8 = 0;
 };
-/// What may be left out where the room allows: a quarter of an LSB8 along the longest ray.
+/// The error allowed to an approximation where memory permits: a quarter of an LSB8 along the longest ray.
 inline constexpr double kMayBeLeftOut = 0.25;
 
-/// What a method has built, and what its builder decided: for `squint plan`.
+/// The tables of a method and the choices of its builder, for `squint plan`.
 struct ClassificationReport {
     std::vector<TableReport> tables;
     std::vector<std::string> notes;
@@ -46,7 +46,7 @@ struct ClassificationReport {
     }
 };
 
-/// Colour and opacity of a slab; the colour is straight or premultiplied, as the method's kPremultiplied
+/// Colour and opacity of a slab.  The colour is straight or premultiplied, as the method's kPremultiplied
 /// says.
 template <class W>
 struct Slab {
@@ -54,9 +54,9 @@ struct Slab {
     W alpha;
 };
 
-/// alpha = 1 - exp(-x): a table over x, linear between rows.  Rows are 2^-row_bits apart; beyond the last,
-/// opaque to the last bit. Error: 2^(-2 row_bits - 3) from the lines, half a last bit from the table's own
-/// words.
+/// alpha = 1 - exp(-x): a table over x with rows 2^-row_bits apart, linear between them; beyond the last
+/// row, opaque to the last bit.  The lines err by 2^(-2 row_bits - 3), the table's words by half a last
+/// bit.
 struct OpacityUnit {
     Table rows;
     int row_bits = 0;
@@ -64,13 +64,13 @@ struct OpacityUnit {
     double longest_ray = 1;  // steps
     Rescale to_alpha;
 
-    /// Of the lines between rows.
+    /// The error of the lines between rows.
     Approximation error() const;
 };
 
-/// A sample in units of table entries: the scalar itself where there is an entry for every level.
+/// A sample in units of table entries: the scalar itself where every level has an entry.
 struct InputStage {
-    bool scaled = false;     // entries are not one level apart
+    bool scaled = false;     // whether entries and levels differ
     std::int64_t scale = 0;  // entries per level, raw with scale_fraction
     double scale_exact = 1;
     int scale_fraction = 0;
@@ -83,34 +83,34 @@ struct InputStage {
         v(to_input);
     }
 };
-/// The stage's constants.  Throws InputError where its wire cannot hold the last entry.
+/// Builds the stage's constants.  Throws InputError where its wire cannot hold the last entry.
 InputStage build_input(const StageInputs& in);
 
-/// Where entries stand among inputs.
+/// How entries and table rows divide the range of inputs.
 struct EntrySpacing {
     int input_fraction = 0;
     int last_segment = 0;  // entries - 2
     int row_bits = 0;      // 2^bits rows an entry, where the opacity of a step bends between entries
 };
 
-/// The sampled transfer function in words.
+/// The sampled transfer function as words.
 struct EntryLookup : EntrySpacing {
     enum Column { red, green, blue, alpha };       // of `table`
     enum MatterColumn { extinction, opaque };      // of `matter`
     enum Opaque { entry_is = 1, segment_is = 2 };  // bits of the column `opaque`
-    Table table;                                   // what a full step looks like: a row, or several, an entry
-    Table matter;                                  // what each entry is made of
+    Table table;                                   // a full step at each entry: one row, or several
+    Table matter;                                  // extinction and opaqueness of each entry
     bool has_opaque = false;
-    std::int64_t least_opaque = 0;  // opacity that no full step of an opaque entry falls below
+    std::int64_t least_opaque = 0;  // no full step of an opaque entry has less opacity
     Rescale to_color, to_alpha;     // lerps between entries
     Rescale to_depth;               // extinction between entries
-    Rescale to_shorter;             // times the length of a slab
+    Rescale to_shorter;             // times a slab's length
     int length_fraction = 0;
     std::int64_t one_alpha = 0;
-    int color_fraction = 0, alpha_fraction = 0;  // of the straight colour and the opacity that come out
+    int color_fraction = 0, alpha_fraction = 0;  // of the straight colour and the opacity that result
     int table_color_fraction = 0, extinction_fraction = 0;  // of the tables' words
     OpacityUnit opacity;
-    Approximation bend;  // of the opacity of a step, between rows
+    Approximation bend;  // of a step's opacity, between rows
 
     template <class V>
     void visit(V&& v) {
@@ -128,7 +128,7 @@ struct EntryLookup : EntrySpacing {
     }
 };
 
-/// What a table builder starts from.
+/// What the builder of a method's tables gets.
 struct ClassificationInputs {
     const Entries& entries;
     const WireSpecs& specs;
@@ -136,29 +136,29 @@ struct ClassificationInputs {
     double step_world = 1;  // length of a full slab
     int input_fraction = 0;
     bool keeps_exact =
-        true;  // unrounded values beside the words: what Real reads of a wire that is not rounded
-    double longest_ray = 1;  // in steps: what errors of one sign add up over
+        true;  // keep exact values beside the words: Real reads them of a wire that it does not round
+    double longest_ray = 1;  // in steps: errors of one sign add up over it
 };
 
-/// What a ray loses at most, of 255, where each of its slabs is off by `error` of optical depth and at least
-/// `least` deep: m error e^(-m least) at its worst number of slabs m <= longest.
+/// The most that a ray can lose, of 255, where each of its slabs errs by `error` of optical depth and is at
+/// least `least` deep: m error e^(-m least) at its worst number of slabs m <= longest.
 double lost_along_ray(double error, double least, double longest);
 
-/// log2 of the rows an entry needs so that the opacity of a step, linear between rows, loses no more than
-/// kMayBeLeftOut along the longest ray, as far as the input's fraction bits and kMostEntryRows allow; and what
-/// is lost.
+/// log2 of the rows an entry needs so that the opacity of a step, linear between rows, loses at most
+/// kMayBeLeftOut along the longest ray, as far as the input's fraction bits and kMostEntryRows allow; and the
+/// loss that is left.
 struct EntryRows {
     int bits = 0;
     double lsb8 = 0;
 };
 EntryRows rows_for_opacity(const ClassificationInputs& inputs);
-inline constexpr int kMostEntryRows = 8192;  // above, the tables outgrow the caches by far
+inline constexpr int kMostEntryRows = 8192;  // larger tables outgrow the caches by far
 
-/// The entries in words.  Throws InputError for formats that cannot hold them.
+/// Builds the entries' words.  Throws InputError for formats that cannot hold them.
 EntryLookup build_entry_lookup(const ClassificationInputs& inputs);
 OpacityUnit build_opacity_unit(const WireSpecs& specs, double longest_ray = 1);
 
-/// Throws InputError, naming the integer bits it takes, where a wire's format cannot hold `largest`.
+/// Throws InputError naming the integer bits needed, where the format of a wire cannot hold `largest`.
 void require_range(const WireSpecs& specs, Wire wire, double largest, const char* what);
 
 }  // namespace squint

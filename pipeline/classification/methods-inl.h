@@ -21,7 +21,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
-/// What a method is, in the word W: its rules, its tables for whoever visits or describes them, and slabs.
+/// A method in the word W: its rules, its tables for visit() and describe(), and classify().
 template <class M, class W>
 concept Classifier = requires(const M& method, M& visited, ClassificationReport& report, W front, W back,
                               W length) {
@@ -31,7 +31,7 @@ concept Classifier = requires(const M& method, M& visited, ClassificationReport&
     method.describe(report);
     { classify(method, front, back, length) } -> std::same_as<Slab<W>>;
 };
-// Every method of the list is one.
+// Every method of the list satisfies it.
 template <class... M>
 constexpr bool are_classifiers(const std::variant<M...>*) {
     return (Classifier<M, std::int64_t> && ...) && (Classifier<M, Real<double>> && ...);

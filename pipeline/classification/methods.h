@@ -1,12 +1,12 @@
-// The one list of classification methods.  Adding a method: a file beside this one, a line here, a name in
-// scene.h.
+// The one list of classification methods.  To add a method: a file beside this one, a line here, a name in
+// scene.h (docs/architecture.md).
 //
 // A method is a type M with
-//   static constexpr bool kPremultiplied   whether its slab colour already carries the opacity
-//   static constexpr bool kNeedsBack       whether it takes the samples at both ends of the slab
-//   visit(v)                               v(Rescale&) for each rescale, v(Table&) or v(CellTable&) for each
-//   table describe(ClassificationReport&)        tables and choices, for `squint plan`
-//   build_...(ClassificationInputs) -> M   its table builder
+//   static constexpr bool kPremultiplied     whether its slab colour already carries the opacity
+//   static constexpr bool kNeedsBack         whether it takes the samples at both ends of the slab
+//   visit(v)                                 calls v(Rescale&), v(Table&) and v(CellTable&) for each it has
+//   describe(ClassificationReport&)          names its tables and choices, for `squint plan`
+//   build_...(ClassificationInputs) -> M     builds its tables
 // and, for every word, classify(const M&, front, back, length) -> Slab.
 #pragma once
 
@@ -23,22 +23,22 @@ namespace squint {
 using ClassificationMethod =
     std::variant<PostClassification, PreIntegrated1D, PreIntegrated2D, PowerSeriesOfOrder1, MomentSeries>;
 
-/// Entries beside a slab's own that its colour may come from: what empty space must leave room for.
+/// How many entries beside a slab's own its colour may depend on: empty space keeps that margin.
 template <class M>
 int entry_reach(const M& method) {
     if constexpr (requires { method.entry_reach(); }) return method.entry_reach();
     return 0;
 }
 
-/// The method that the settings name, with its tables built.  Throws InputError for orders and formats it
-/// cannot have.
+/// Builds the method that the settings name, with its tables.  Throws InputError for an order or a format
+/// that it cannot have.
 ClassificationMethod build_method(const ClassificationInputs& inputs);
 
-/// Gives the tables of a method that was built from these inputs their unrounded values.  Other copies of the
-/// method keep theirs.
+/// Adds exact values to the tables of a method that was built from these inputs.  Other copies of the method
+/// stay as they are.
 void need_exact(ClassificationMethod& method, ClassificationInputs inputs);
 
-/// Gives lanes of floats their tables, once there are unrounded values.
+/// Adds tables for lanes of floats, after need_exact().
 void need_floats(ClassificationMethod& method);
 
 }  // namespace squint

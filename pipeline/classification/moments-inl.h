@@ -18,8 +18,8 @@ namespace squint::HWY_NAMESPACE {
 template <class W>
 using Powers = std::array<W, kMostMomentOrder>;
 
-/// One end of a slab in its block: depths from the block's start to its sub-entry's start, to itself, and to
-/// the sub-entry's end.
+/// One end of a slab in its block: the depth from the block's start to the start of its sub-entry, to the end
+/// itself, and to the end of the sub-entry.
 template <class W>
 struct MomentEnd {
     W row, fraction, start, depth, next;
@@ -32,17 +32,17 @@ HWY_INLINE MomentEnd<W> moment_end(const MomentSeries& m, W row, W fraction) {
     return end;
 }
 
-/// A slab as its first sub-entry's part, whole sub-entries and the last one's part, each with its share of
-/// the depth: shares and moments are sums of positive terms, however short the slab is in its block.
+/// A slab as three parts: a part of its first sub-entry, whole sub-entries, and a part of its last one, each
+/// with its share of the depth.  Shares and moments are sums of positive terms, however short the slab.
 template <class W>
 struct SlabParts {
     MomentEnd<W> a, b;
     W span, whole;  // depths
     W first_share, whole_share;
-    Powers<W> first_mean, last_mean;  // of y^k over the parts
+    Powers<W> first_mean, last_mean;  // means of y^k over the parts
     Powers<W> whole_power;            // whole_share^(k + 1)
 };
-/// No wider than one: what the meaning of a word says and intervals do not see.
+/// Promises that a value is at most one, which intervals cannot see.
 template <class W>
 HWY_INLINE W share_of(const MomentSeries& m, W part, W span) {
     return min(divide(part, span, m.to_share), constant<W>(std::int64_t{1} << m.word_fraction));
@@ -79,7 +79,7 @@ HWY_INLINE SlabParts<W> slab_parts(const MomentSeries& m, const MomentEnd<W>& a,
     return parts;
 }
 
-/// int c y^k dy of a channel, k < order.
+/// The moments int c y^k dy of a channel, k < order.
 template <class W>
 HWY_INLINE Powers<W> mean_moments(const MomentSeries& m, const SlabParts<W>& p, int channel) {
     const auto count = static_cast<std::size_t>(m.order);
@@ -94,7 +94,7 @@ HWY_INLINE Powers<W> mean_moments(const MomentSeries& m, const SlabParts<W>& p, 
     const W first = share_of(m, clamp(select(same, b_here, a_next) - a_here, zero, one), p.span);
     const W last = share_of(m, clamp(select(same, zero, b_here - b_start), zero, one), p.span);
 
-    // Whole sub-entries, about their own start and over their own depth.
+    // The whole sub-entries, from their own start and over their own depth.
     Powers<W> moment;
     moment[0] = clamp(select(same, zero, b_start - a_next), zero, one);
     for (std::size_t k = 1; k < count; ++k)
@@ -104,7 +104,7 @@ HWY_INLINE Powers<W> mean_moments(const MomentSeries& m, const SlabParts<W>& p, 
         for (std::size_t k = count - 1; k >= pass; --k)
             moment[k] = clamp(moment[k] - quantise(p.a.next * moment[k - 1], m.to_product), zero, one);
     const W whole = divisor<W>(p.whole);
-    // Of a thin part the words hold the lower moments alone.
+    // For a thin part the words resolve only the lower moments.
     for (std::size_t k = 0; k < count; ++k) {
         for (std::size_t times = 0; times <= k; ++times) moment[k] = share_of(m, moment[k], whole);
         const auto thin = p.whole < constant<W>(resolved_depth(m.word_fraction, k));
@@ -114,7 +114,7 @@ HWY_INLINE Powers<W> mean_moments(const MomentSeries& m, const SlabParts<W>& p, 
         moment[k] = select(thin, clamp(quantise(max(sum, zero), m.to_mean), zero, one), moment[k]);
     }
 
-    // The three parts, one behind the other.
+    // Joins the three parts, one after the other.
     for (std::size_t k = 0; k < count; ++k) moment[k] = quantise(moment[k] * p.whole_power[k], m.to_product);
     for (std::size_t pass = 1; pass < count; ++pass)
         for (std::size_t k = count - 1; k >= pass; --k)
@@ -126,7 +126,7 @@ HWY_INLINE Powers<W> mean_moments(const MomentSeries& m, const SlabParts<W>& p, 
     return moment;
 }
 
-/// L_j from the moments int c y^k dy.
+/// The Legendre moments L_j from the moments int c y^k dy.
 template <class W>
 HWY_INLINE Powers<W> legendre_moments(const MomentSeries& m, const Powers<W>& mean) {
     const W one = constant<W>(std::int64_t{1} << m.word_fraction);
@@ -139,11 +139,11 @@ HWY_INLINE Powers<W> legendre_moments(const MomentSeries& m, const Powers<W>& me
     return result;
 }
 
-/// The straight colour of the piece between two inputs, `depth` deep.
+/// The straight colour of the piece between two inputs, which is `depth` deep.
 template <class W>
 HWY_NOINLINE std::array<W, 3> series_color(const MomentSeries& m, W near, W far, W depth) {
     const W zero = constant<W>(0);
-    // The level whose block holds both ends.
+    // Choose the level whose block holds both ends.
     const EntryLookup& e = m.prefix.entries;
     const EntryPosition<W> low = sub_entry_position(e, m.sub_entry_bits, min(near, far)),
                            high = sub_entry_position(e, m.sub_entry_bits, max(near, far));
@@ -156,7 +156,7 @@ HWY_NOINLINE std::array<W, 3> series_color(const MomentSeries& m, W near, W far,
                        b = moment_end(m, base + high.entry, high.fraction);
     const SlabParts<W> parts = slab_parts(m, a, b);
 
-    // Weights between two rows.
+    // Interpolate the weights between two rows.
     const int fraction = m.depth_fraction - m.row_bits;
     const W row = min(floor_shift(depth, fraction), constant<W>(m.weights.rows() - 2));
     const std::int64_t one = std::int64_t{1} << fraction;
@@ -187,8 +187,8 @@ HWY_NOINLINE std::array<W, 3> series_color(const MomentSeries& m, W near, W far,
     return color;
 }
 
-/// The last input at which T, in its words' units, is not above `target`: by bisection, first over entries,
-/// then inside one.
+/// Finds the last input at which T, in units of its words, is at most `target`: by bisection, over entries
+/// first, then inside one.
 template <class W>
 HWY_NOINLINE W input_at_depth(const MomentSeries& m, W target) {
     const PrefixLookup& p = m.prefix;
@@ -211,13 +211,13 @@ HWY_NOINLINE W input_at_depth(const MomentSeries& m, W target) {
     return shift_left(entry, e.input_fraction) + fraction;
 }
 
-/// The optical depth of a cut slab, and T's difference that it comes from.
+/// The optical depth of a cut slab, and the difference of T that gives it.
 template <class W>
 struct SlabDepth {
     W difference, depth;
 };
 
-/// The straight colour of a slab in kPieces pieces of equal depth, none but the last deeper than the limit.
+/// The straight colour of a slab in kPieces pieces of equal depth; only the last may exceed the limit.
 template <class W>
 HWY_NOINLINE std::array<W, 3> color_in_pieces(const MomentSeries& m, const CutSlab<W>& cut, W front, W length,
                                               const SlabDepth<W>& whole) {

@@ -20,7 +20,7 @@ constexpr int kMostRows = kMostEntryRows;
 constexpr int kMostDeepRows = 32768;  // where an entry is deeper than 8: 2 rows err by 39 LSB8, 8 by 5
 constexpr std::int64_t kMostValues = 8 << 20;
 
-/// One entry of the tables: its depth, and its light in every channel.
+/// One entry of the tables: its depth, and the light of each channel.
 struct Step {
     double depth;
     std::array<double, 3> light;
@@ -40,8 +40,8 @@ std::vector<Step> steps_of(const Entries& entries) {
     return steps;
 }
 
-/// Fills the block of `length` steps from `start` on, in units of its own depth's power of two:
-/// write_moment_rows for any rounding, with the exact values.
+/// Fills the block of `length` steps from `start` on, in units of the power of two above its depth.  It is
+/// write_moment_rows for any rounding, and sets exact values.
 void fill_block(MomentSeries& m, const std::vector<Step>& steps, int row, int start, int length, double unit,
                 const Spec& spec) {
     const int end = std::min<int>(start + length, static_cast<int>(steps.size()));
@@ -71,8 +71,8 @@ void fill_block(MomentSeries& m, const std::vector<Step>& steps, int row, int st
     }
 }
 
-/// The power of two that a block's depth lies below, by halves of it: blocks of a level are sums of two of
-/// the level below, and only where a sum's last bits decide are its steps added one by one, as the rows are.
+/// The power of two just above a block's depth, from sums of two blocks of the level below.  Only where such
+/// a sum's last bits decide are its steps added one by one, as the rows are.
 class BlockUnits {
   public:
     explicit BlockUnits(const std::vector<Step>& steps) : steps_(steps), sums_(steps.size() + 2) {
@@ -102,7 +102,7 @@ class BlockUnits {
     std::vector<double> sums_;
 };
 
-/// Steps as vectors take them.
+/// Steps as the vector code takes them.
 MomentSteps side_by_side(const std::vector<Step>& steps, int order) {
     MomentSteps result{order, 1 + 3 * order <= 8 ? 8 : MomentSteps::kPadded, {}};
     result.number.resize(steps.size() * static_cast<std::size_t>(result.padded));
@@ -118,7 +118,7 @@ MomentSteps side_by_side(const std::vector<Step>& steps, int order) {
 int level_count(int steps) {
     return static_cast<int>(std::bit_width(static_cast<unsigned>(steps - 1))) + 1;
 }
-/// Rows of all blocks of a level.
+/// Writes the rows of all blocks of a level.
 int level_rows(int steps, int level) {
     return (steps / (1 << level) + 1) * ((2 << level) + 1);
 }
@@ -170,7 +170,7 @@ void fill_moments(MomentSeries& m, const Entries& fine, const Spec& spec, bool k
     if (in_vectors) m.moments.take(std::move(words));
 }
 
-/// g_j(x), j >= 1: what L_j is multiplied with for the straight colour.
+/// g_j(x), j >= 1: the weight of L_j in the straight colour.
 double legendre_weight_over_opacity(int j, double x) {
     if (x <= 0) return 0;
     return (j % 2 ? -1 : 1) * (2 * j + 1) * preintegration::legendre_weight(j, x) /
@@ -207,7 +207,7 @@ Table computed_weights(int order, bool legendre, double deepest, int row_bits, c
 
 void fill_weights(MomentSeries& m, bool legendre, double deepest) {
     const Spec spec{{5, m.weight_fraction, true}, Rounding::rnd_conv, Overflow::sat};
-    // They know nothing of the transfer function, and copies share their rows: the last few are kept.
+    // They do not depend on the transfer function, and copies share rows: the last few are kept.
     struct Kept {
         int order, row_bits;
         bool legendre;
@@ -260,7 +260,7 @@ MomentSeries build_moment_series(const ClassificationInputs& in) {
     const Spec moment = in.specs[Wire::table_moment], ratio = in.specs[Wire::slab_ratio],
                depth = in.specs[Wire::slab_depth], alpha = in.specs[Wire::slab_alpha];
 
-    // Sub-entries where one entry alone is deep.
+    // Sub-entries where a single entry is deep.
     const double deepest = preintegration::deepest_entry(in.entries, in.step_world);
     const int wanted = deepest <= 1 ? 0 : deepest <= 8 ? 2 : 3;
     const EntryRows for_color = rows_for_color(in, kMostRows);
@@ -278,7 +278,7 @@ MomentSeries build_moment_series(const ClassificationInputs& in) {
     if (m.sub_entry_bits) between = preintegration::subdivided(in.entries, 1 << m.sub_entry_bits);
     const Entries& fine = m.sub_entry_bits ? between : in.entries;
 
-    // Words of the moments: as many bits as the wire has, at most 28, so that products fit 64-bit lanes.
+    // The words of moments have the wire's bits, at most 28, so that products fit 64-bit lanes.
     const int wire = static_cast<int>(Wire::table_moment);
     m.word_fraction = std::clamp(moment.format.integer_bits + moment.format.fraction_bits, 8, 28);
     const Spec word{{1, m.word_fraction, false}, moment.rounding, Overflow::sat};
@@ -292,7 +292,7 @@ MomentSeries build_moment_series(const ClassificationInputs& in) {
         m.inverse[k] = static_cast<std::int64_t>(
             std::floor(std::ldexp(1.0, kInverseBits) / (static_cast<double>(k) + 1) + 0.5));
 
-    // Weights, and the depth up to which they hold.
+    // Weights, and the depth up to which they are good.
     m.depth_fraction = depth.format.fraction_bits;
     m.row_bits = std::min(10, m.depth_fraction);
     const double limit =
@@ -308,7 +308,7 @@ MomentSeries build_moment_series(const ClassificationInputs& in) {
         m.highest[static_cast<std::size_t>(c)] = quantise_real(range.high[c], nearest);
     }
 
-    // Cutting deep slabs.
+    // How deep slabs are cut.
     const Spec extinction = in.specs[Wire::table_extinction];
     m.to_cut = Rescale(extinction.format.fraction_bits, {extinction.format, Rounding::trn, Overflow::sat});
     m.to_piece = Rescale(2 * alpha.format.fraction_bits, alpha, static_cast<int>(Wire::slab_alpha));

@@ -1,5 +1,5 @@
 // Stage 4, PIPS(n), n = 2 to 5, and LEG(n), n = 2 to 4: pre-integration by moments of the colour over a
-// slab's own optical depth (Lee & Shin 2013, equations 22 to 25; docs/classification.md). inputs at both ends
+// slab's own optical depth (Lee & Shin 2013, equations 22 to 25; docs/classification.md). Inputs at both ends
 // (I.F) -> straight colour K (1.F), opacity (1.F).
 //
 // With y = t / x the share of the slab's depth x in front of a point, both methods are one sum over Legendre
@@ -7,13 +7,13 @@
 //
 //     K = sum_j g_j(x) (2j+1 and signs within g) L_j,    L_j = int_0^1 c P_j(2y - 1) dy,   g_0 = 1
 //
-// and differ in the weights g_j alone, a table over x: LEG's are bounded at every depth, PIPS's up to its
-// trusted one.  A slab seen from the other side changes the sign of odd L_j.
+// and differ only in the weights g_j, a table over x: those of LEG are bounded at every depth, those of PIPS
+// up to its trusted depth.  A slab seen from the other side changes the sign of odd L_j.
 //
-// Moments come from overlapped level tables (docs/math.md#b36): blocks of 2^(l+1) entries every 2^l, prefixes from
-// the block's own start, in units of the block's own depth, so that every word lies in [0, 1] and a slab's
-// difference cancels two bits at most for even matter.  Units cancel in L_j.  Inside an entry extinction and
-// colour are constant.
+// Moments come from overlapped level tables (docs/math.md#b36): blocks of 2^(l+1) entries every 2^l, with
+// prefix sums from the block's own start in units of its own depth.  So every word lies in [0, 1], and for
+// even matter a slab's difference cancels two bits at most.  The units cancel in L_j.  Inside an entry
+// extinction and colour are constant.
 #pragma once
 
 #include "pipeline/classification/prefix.h"
@@ -27,7 +27,7 @@
 namespace squint {
 
 inline constexpr int kMostMomentOrder = 5;
-inline constexpr int kPieces = 4;  // of a slab that LEG cuts
+inline constexpr int kPieces = 4;  // pieces of a deep slab, for LEG
 inline constexpr int kInverseBits = 24;
 
 using MomentSquare = std::array<std::array<std::int64_t, kMostMomentOrder>, kMostMomentOrder>;
@@ -59,7 +59,7 @@ struct MomentSeries {
     int weight_fraction = 18;
     int row_bits = 10;  // rows of `weights` are 2^-row_bits apart
     int depth_fraction = 0;
-    bool splits = false;     // slabs deeper than `limit` are cut (LEG), or take order 1 (PIPS)
+    bool splits = false;     // cut slabs deeper than `limit` (LEG), or give them order 1 (PIPS)
     std::int64_t limit = 0;  // raw, of slab_depth
     std::array<std::int64_t, 3> lowest{}, highest{};       // of the entries' colours
     std::array<std::int64_t, kMostMomentOrder> inverse{};  // 2^24 / (k + 1)
@@ -74,7 +74,7 @@ struct MomentSeries {
     Rescale to_whole;  // pieces' light over their opacity
     std::string note;
     Approximation rows_of_color;                               // constant in a sub-entry
-    std::shared_ptr<const preintegration::ExactSeries> exact;  // without rounding: no rows, no sub-entries
+    std::shared_ptr<const preintegration::ExactSeries> exact;  // used without rounding: no rows
 
     template <class V>
     void visit(V&& v) {
@@ -85,11 +85,11 @@ struct MomentSeries {
     }
     void describe(ClassificationReport& report) const;
 };
-/// The depth in a block, raw, from which on words of `fraction` bits hold its moment k to 2^-10.
+/// The depth in a block, raw, from which words of `fraction` bits hold its moment k to 2^-10.
 constexpr std::int64_t resolved_depth(int fraction, std::size_t k) {
     return std::int64_t{1} << (fraction - std::max(0, fraction - 10) / (static_cast<int>(k) + 1));
 }
-/// PIPS(2 to 5) and LEG(2 to 4).  Throws InputError for other orders.
+/// Builds PIPS(2 to 5) or LEG(2 to 4).  Throws InputError for other orders.
 MomentSeries build_moment_series(const ClassificationInputs& inputs);
 
 }  // namespace squint

@@ -1,12 +1,12 @@
-// Stage 4, post-classification: the sample's own entry, front or middle of the slab.
-// input (I.F, in table entries) -> straight colour (1.F), opacity (1.F).  Squeeze, section 4.4.
+// Stage 4, post-classification: classifies the sample at the front or the middle of the slab.  Input (I.F, in
+// table entries) -> straight colour (1.F), opacity (1.F).  Squeeze, section 4.4.
 #pragma once
 
 #include "pipeline/classification/entries.h"
 
 namespace squint {
 
-/// The entries alone: colour, opacity of a full step, extinction for a ray's last, shorter slab.
+/// The entries alone: colour and opacity of a full step, and extinction for a ray's last, shorter slab.
 struct PostClassification {
     static constexpr bool kPremultiplied = false;
     static constexpr bool kNeedsBack = false;

@@ -15,7 +15,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
-/// mean_of(column, to): the part of a slab's span that a column's values cover, on their way to a wire.
+/// mean_of(column, to): the mean of a column over the slab's span, quantised to a wire.
 template <class W, class MeanOf>
 HWY_INLINE Slab<W> classify_means(const PreIntegrated1D& m, const CutSlab<W>& cut, W front, W length,
                                   const MeanOf& mean_of) {
@@ -36,7 +36,7 @@ HWY_INLINE Slab<W> classify_means(const PreIntegrated1D& m, const CutSlab<W>& cu
     }
     return finish_premultiplied(m.prefix, m.premultiplied, cut, front, length, slab);
 }
-/// Without rounding: means of values linear between entries.
+/// Without rounding: means of values that are linear between entries.
 template <class W>
 HWY_INLINE Slab<W> classify_exactly(const PreIntegrated1D& m, W front, W back, W length) {
     const EntryLookup& e = m.prefix.entries;
@@ -63,7 +63,7 @@ HWY_INLINE Slab<W> classify_exactly(const PreIntegrated1D& m, W front, W back, W
         };
         const double mean = mean_between(ascending ? cut.front : cut.end, ascending ? cut.end : cut.front,
                                          e.input_fraction, at, between);
-        // to.shift: sum_fraction and the bits a place gains, less an input's and the wire's own.
+        // to.shift holds sum_fraction and the bits gained at a place, minus an input's and the wire's own.
         const int gained = m.curved ? e.input_fraction + 1 : 0;
         to.shift -= m.sum_fraction + gained;
         return quantise(W{mean * part}, to);

@@ -20,7 +20,7 @@ PreIntegrated1D build_pre_integrated_1d(const ClassificationInputs& in) {
     const Spec sum = in.specs[Wire::table_moment];
     require_range(in.specs, Wire::table_moment, tables.sum.back(),
                   "the prefix sums of the entries' opacities");
-    // Straight sums give a slab of one last bit the mean of its entry.
+    // With straight sums a slab of one last bit gets the mean of its entry.
     double lost = 0;
     const auto& values = tables.value;
     for (std::size_t i = 0; i + 1 < values.size(); ++i)
@@ -50,7 +50,7 @@ PreIntegrated1D build_pre_integrated_1d(const ClassificationInputs& in) {
     const std::array specs{sum, sum, sum, sum, bend, bend, bend, bend};
     m.sums.fill(sums, std::span(specs).first(static_cast<std::size_t>(columns)));
     m.most_rise = most_rise_of(m.sums, PreIntegrated1D::columns);
-    // Of a sum over a span: an input's fraction bits are in both, a bend brings as many more and one.
+    // A sum over a span: both have an input's fraction bits; a bend adds as many and one more.
     const int mean = sum.format.fraction_bits + (m.curved ? in.input_fraction + 1 : 0);
     const auto to = [&](Wire wire) {
         Rescale quotient(mean, in.specs[wire], static_cast<int>(wire));

@@ -15,7 +15,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
-/// Where an input stands between two nodes.
+/// The position of an input between two nodes.
 template <class W>
 HWY_INLINE EntryPosition<W> node_position(const PreIntegrated2D& m, W input) {
     const int bits = m.node_fraction;
@@ -30,7 +30,7 @@ HWY_INLINE EntryPosition<W> node_position(const PreIntegrated2D& m, W input) {
     return {cell, within(min(node - shift_left(cell, bits), constant<W>(one)), 0, one)};
 }
 
-/// The table between its cells: three lerps, each rounded once.
+/// Interpolates the table between its nodes: three lerps, each rounded once.
 template <class W>
 HWY_INLINE Slab<W> look_up(const PreIntegrated2D& m, W front, W back) {
     const EntryPosition<W> f = node_position(m, front), b = node_position(m, back);

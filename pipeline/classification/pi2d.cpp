@@ -11,17 +11,17 @@
 namespace squint {
 namespace {
 
-// Walls that a prediction finds are no matter of the table: behind it they are as translucent as any.
+// Walls that prediction finds are left out of the table: there they are as translucent as other entries.
 Entries without_walls(Entries entries, bool predicts) {
     if (predicts)
         for (Entry& entry : entries.entry) entry.opaque = false;
     return entries;
 }
 
-// Doubles in [0, 1] to words of a Spec.
+// Doubles in [0, 1] as words of a Spec.
 struct Encode {
     Spec color, alpha;
-    bool fits_u16;  // rnd_conv words of at most 16 bits: encoded many at once
+    bool fits_u16;  // rnd_conv words of at most 16 bits: encoded with SIMD
 
     Encode(const Spec& c, const Spec& a) : color(c), alpha(a) {
         const auto plain = [](const Spec& s) {
@@ -66,8 +66,8 @@ void fill(const Entries& entries, int size, double length, bool self_attenuation
         encode(static_cast<int>(i % 4), std::span(&cell[i], 1), words.subspan(i, 1));
 }
 
-// Between nodes d apart in depth and dc in colour, slabs of next to no length: bilinear cells err by d^2 / 16 in
-// opacity, and by d dc / 6 in colour, along the diagonal on which they lie.
+// Between nodes d apart in depth and dc in colour, very short slabs lie on the diagonal of the table: there
+// the bilinear lookup errs by d^2 / 16 in opacity and by d dc / 6 in colour.
 double lost_between_nodes(const ClassificationInputs& in, int size) {
     const auto place = [&](int node) {
         return node * static_cast<double>(in.entries.size() - 1) / (size - 1);
@@ -128,8 +128,8 @@ PreIntegrated2D build_pre_integrated_2d(const ClassificationInputs& in) {
         fill<double>(entries, size, length, attenuated, encode, raw);
         return raw;
     });
-    // Weights: as fine as the input, or finer by as many bits as a node has entries; products of 16-bit cells
-    // and quotients stay within 32-bit lanes.
+    // Weights are as fine as the input, or finer by as many bits as a node has entries; products of 16-bit
+    // nodes and quotients stay within 32-bit lanes.
     m.scaled = size != m.entries;
     const int integer = static_cast<int>(std::bit_width(static_cast<unsigned>(size - 1)));
     const int finer = static_cast<int>(std::bit_width(static_cast<unsigned>((m.entries - 1) / (size - 1))));

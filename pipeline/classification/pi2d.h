@@ -1,10 +1,10 @@
 // Stage 4, PI2D: the slab integral in a table over both ends, for one slab length (Engel et al. 2001).
-// inputs at both ends (I.F) -> premultiplied colour (1.F), opacity (1.F).
+// Inputs at both ends (I.F) -> premultiplied colour (1.F), opacity (1.F).
 //
-// size x size cells of four words, in the formats of slab_color and slab_alpha; node j stands at entry
-// j (entries - 1) / (size - 1).  Bilinear, or the nearest cell.  Full slabs are looked up; a shorter slab,
-// and one that an opaque entry ends, takes alpha exactly from T and the cell's colour times alpha' / alpha:
-// the self-attenuation inside it stays that of a full slab.
+// size x size nodes of four words, in the formats of slab_color and slab_alpha; node j lies at entry j
+// (entries - 1) / (size - 1).  Bilinear, or the nearest node.  Full slabs are looked up.  A shorter slab, and
+// one that ends at an opaque entry, takes alpha exactly from T and the table's colour times alpha' / alpha:
+// it keeps the self-attenuation of a full slab.
 #pragma once
 
 #include "fixedpoint/cell_table.h"
@@ -21,10 +21,10 @@ struct PreIntegrated2D {
     bool nearest = false, self_attenuation = true;
     int entries = 0;
     int node_fraction = 0;  // of a coordinate in nodes
-    bool scaled = false;    // nodes are not one entry apart
+    bool scaled = false;    // whether nodes and entries differ
     Approximation between_nodes;
     Rescale to_node;             // input (size - 1) / (entries - 1)
-    Rescale to_color, to_alpha;  // lerps between cells
+    Rescale to_color, to_alpha;  // lerps between nodes
 
     template <class V>
     void visit(V&& v) {

@@ -25,13 +25,13 @@ HWY_INLINE std::array<std::array<W, 4>, 2> prefix_rows(const PowerSeriesOfOrder1
     };
     return {at(row), at(row + constant<W>(1))};
 }
-/// What the method knows of one sample: the back of a slab is the front of the next.
+/// What the method computes of one sample: the back of a slab is the front of the next.
 template <class W>
 struct PrefixSample {
     W input;
     EntryPosition<W> at;           // in rows of T
     std::array<W, 4> sums, rises;  // T and X1 at the row, and their rise to the next
-    Wide<W> bend;                  // what T's bend takes from it
+    Wide<W> bend;                  // what the bend of T takes from it
 };
 template <class W>
 HWY_INLINE PrefixSample<W> sample_of(const PowerSeriesOfOrder1& m, W input) {
@@ -47,7 +47,7 @@ HWY_INLINE PrefixSample<W> sample_of(const PowerSeriesOfOrder1& m, W input) {
     return s;
 }
 
-/// The difference of a prefix sum between two samples, exact with place_bits() more fraction bits than its
+/// The difference of a prefix sum between two samples, exact, with place_bits() more fraction bits than its
 /// words.
 template <class W>
 HWY_INLINE Wide<W> prefix_difference(const PrefixSample<W>& front, const PrefixSample<W>& back,
@@ -55,7 +55,7 @@ HWY_INLINE Wide<W> prefix_difference(const PrefixSample<W>& front, const PrefixS
     return wide_sum(back.sums[column] - front.sums[column], place_bits,
                     back.at.fraction * back.rises[column] - front.at.fraction * front.rises[column]);
 }
-/// The slab up to its end, cut or not.
+/// Classifies the slab up to its end, whether a wall cuts it or not.
 template <class W>
 HWY_INLINE Slab<W> classify(const PowerSeriesOfOrder1& m, const PrefixSample<W>& front,
                             const PrefixSample<W>& end, const CutSlab<W>& cut, W length) {
@@ -69,7 +69,7 @@ HWY_INLINE Slab<W> classify(const PowerSeriesOfOrder1& m, const PrefixSample<W>&
     if (any_positive(depth))
         slab.alpha = opacity_of_depth(m.prefix.entries.opacity,
                                       depth_of(m.prefix, depth, widen(divisor<W>(cut.span)), length));
-    if (any(zero < slab.alpha)) {  // of what is not seen the colour is any
+    if (any(zero < slab.alpha)) {  // an invisible slab may have any colour
         const Wide<W> some = divisor<W>(absolute(straight));
         for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
             const Wide<W> colored = absolute(prefix_difference(front, end, c + 1, bits));

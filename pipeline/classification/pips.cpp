@@ -31,10 +31,10 @@ PowerSeriesOfOrder1 build_power_series_of_order_1(const ClassificationInputs& in
                          ratio, static_cast<int>(Wire::slab_ratio));
     m.to_ratio.divides = true;
     m.one_ratio = ratio.format.one();
-    m.to_ratio.highest = std::min(m.to_ratio.highest, m.one_ratio);  // a mean of colours
+    m.to_ratio.highest = std::min(m.to_ratio.highest, m.one_ratio);  // no mean exceeds its colours
     const std::int32_t *depth = m.prefix.depth.narrow(), *colored = m.moment.narrow();
     const int stride = m.prefix.depth.columns(), n = m.moment.rows();
-    if (!depth || !colored) {  // no 32-bit lanes for such words
+    if (!depth || !colored) {  // 32-bit lanes cannot hold such words
         m.most_rise = m.prefix.total + 1;
         return m;
     }

@@ -18,8 +18,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
-/// A quotient whatever its wire: where the wire has fewer fraction bits than the exact quotient, the
-/// denominator is shifted.
+/// A quotient for any wire: where the wire has fewer fraction bits than the exact quotient, the denominator
+/// is shifted.
 template <class N>
 HWY_INLINE auto divide(const N& numerator, const N& denominator, const Rescale& to) {
     Rescale whole = to;
@@ -27,15 +27,15 @@ HWY_INLINE auto divide(const N& numerator, const N& denominator, const Rescale& 
     return quotient(numerator, to.shift > 0 ? N(shift_left(denominator, to.shift)) : denominator, whole);
 }
 
-/// A prefix sum at a position, straight between rows and exact: `bits` more fraction bits than its words.
+/// A prefix sum at a position, linear between rows, exact: it has `bits` more fraction bits than its words.
 template <class W>
 HWY_INLINE W prefix_at(const Table& table, const EntryPosition<W>& at, int column, int bits) {
     return blend(gather(table, at.entry, column), gather(table, at.entry + constant<W>(1), column),
                  at.fraction, bits);
 }
 
-/// What a quotient may divide by: x >= 0, or a last bit where it is zero.  Without rounding every x above zero
-/// is itself.  N: the word or its Wide.
+/// A divisor: x >= 0, or its last bit where it is zero.  Without rounding every x above zero stays as it is.
+/// N: the word or its Wide.
 template <class W, class N>
 HWY_INLINE N divisor(const N& x) {
     if constexpr (RealWord<W>)
@@ -46,7 +46,7 @@ HWY_INLINE N divisor(const N& x) {
         return max(x, widen(constant<W>(1)));
 }
 
-/// T, exact with gained_bits() more fraction bits than its words.  With tau linear over a row's reach,
+/// T, exact, with gained_bits() more fraction bits than its words.  For tau linear over a row,
 ///
 ///     T(u) = T_i + u (T_(i+1) - T_i) - u (1 - u) / 2 (tau_(i+1) - tau_i),    0 <= u <= 1.
 template <class W>
@@ -60,8 +60,8 @@ HWY_INLINE W depth_at(const PrefixLookup& p, const EntryPosition<W>& at) {
                   (p.total + 1) << p.gained_bits());
 }
 
-/// The difference of a prefix sum between two positions, exact with `bits` more fraction bits than its words,
-/// which rise by `most_rise` from row to row.
+/// The difference of a prefix sum between two positions, exact, with `bits` more fraction bits than its
+/// words, which rise by at most `most_rise` from row to row.
 template <class W>
 HWY_INLINE Wide<W> prefix_difference(const Table& table, const EntryPosition<W>& front,
                                      const EntryPosition<W>& end, int column, int bits,
@@ -73,7 +73,7 @@ HWY_INLINE Wide<W> prefix_difference(const Table& table, const EntryPosition<W>&
     };
     return wide_sum(to - from, bits, part(end, to) - part(front, from));
 }
-/// What the bend of a prefix sum takes from it, for a change by `bends`' column over a row (depth_at).
+/// What a prefix sum loses to its bend, for a change over a row by a column of `bends` (depth_at).
 template <class W>
 HWY_INLINE Wide<W> bend_at(const Table& bends, const EntryPosition<W>& at, int column, int place_bits) {
     const std::int64_t one = std::int64_t{1} << place_bits;
@@ -86,13 +86,13 @@ HWY_INLINE Wide<W> bend_at(const PrefixLookup& p, const EntryPosition<W>& at) {
     return bend_at(p.depth, at, 1, p.place_bits());
 }
 
-/// A slab cut where it first meets an opaque entry: in either direction, both ends included.
+/// A slab cut at the first opaque entry that it meets, in either direction, both ends included.
 template <class W>
 struct CutSlab {
     EntryPosition<W> front, end;  // the translucent part
     W front_input, end_input;
-    W span;  // |s_b - s_f| of the whole slab: the rate is kept
-    W wall;  // 1 where an opaque entry ends it
+    W span;  // |s_b - s_f| of the whole slab: its rate is kept
+    W wall;  // 1 where an opaque entry ends the slab
     W wall_entry;
 };
 template <class W>
@@ -117,7 +117,7 @@ HWY_INLINE CutSlab<W> cut_at_wall(const PrefixLookup& p, W front, W back) {
     return cut;
 }
 
-/// The optical depth of a difference of T over a span of inputs, at least one, for a slab of `length`.  N:
+/// The optical depth of a slab of `length` from a difference of T over a span of inputs, at least one.  N:
 /// the word or its Wide.
 template <class N, class W>
 HWY_INLINE W depth_of(const PrefixLookup& p, const N& difference, const N& span, W length) {
@@ -127,8 +127,8 @@ HWY_INLINE W depth_of(const PrefixLookup& p, const N& difference, const N& span,
         depth = select(shorter, shortened(depth, length, p.entries.length_fraction, p.to_shorter), depth);
     return depth;
 }
-/// What a curve through entries gives between two places: its mean over [low, high], of parts that nothing is
-/// subtracted from.  at(i): its value at entry i; between(i, j): its integral from entry i to j.
+/// The mean of a curve through entries over [low, high], as a sum without cancellation.  at(i): the curve at
+/// entry i; between(i, j): its integral from entry i to entry j.
 template <class At, class Between>
 double mean_between(const EntryPosition<Real<double>>& low, const EntryPosition<Real<double>>& high,
                     int input_fraction, const At& at, const Between& between) {
@@ -143,8 +143,8 @@ double mean_between(const EntryPosition<Real<double>>& low, const EntryPosition<
     const double first = (1 - u) * (value(i, u) + at(i + 1)) / 2, last = v * (at(j) + value(j, v)) / 2;
     return (first + between(i + 1, j) + last) / ((j - i - 1) + (1 - u) + v);
 }
-/// Without rounding: of extinction itself, linear between entries, over the part up to the wall, which has its
-/// share of the span.
+/// Without rounding: the integral of extinction itself, linear between entries, over the part before the
+/// wall, with its share of the span.
 inline Real<double> exact_depth(const PrefixLookup& p, const CutSlab<Real<double>>& cut,
                                 Real<double> length) {
     const bool ascending = cut.front_input < cut.end_input;
@@ -177,7 +177,7 @@ HWY_INLINE W slab_depth(const PrefixLookup& p, const CutSlab<W>& cut, W length) 
     return depth_of(p, absolute(difference), widen(divisor<W>(cut.span)), length);
 }
 
-/// Without rounding: a slab of the entries' own curves.
+/// Without rounding: a slab of the curves between entries.
 inline Slab<Real<double>> exact_slab_of(const EntryLookup& e, const preintegration::ExactSeries& series,
                                         Real<double> front, Real<double> back, Real<double> length) {
     const double input = power_of_two<double>(-e.input_fraction);
@@ -197,15 +197,15 @@ HWY_INLINE W wall_color(const EntryLookup& e, const CutSlab<W>& cut, int channel
     const W color = gather(e.table, shift_left(cut.wall_entry, e.row_bits), channel);
     return quantise(shift_left(color, e.input_fraction - e.row_bits), e.to_color);
 }
-/// Slabs that are one point: both ends equal, or a front that is opaque itself.
+/// Classifies slabs that are one point: equal ends, or an opaque front.
 template <class W>
 HWY_INLINE auto is_point(const PrefixLookup& p, const CutSlab<W>& cut) {
     const auto equal = cut.span == constant<W>(0);
     return p.predicts ? equal | is_opaque(p.entries, cut.front) : equal;
 }
 
-/// The last word on a slab: where its ends are equal it is the point itself; behind a wall nothing is seen.
-/// `part` is straight.
+/// Finishes a slab: one with equal ends is classified as a point; behind a wall nothing is seen.  `part` is
+/// straight.
 template <class W>
 HWY_INLINE Slab<W> finish_straight(const PrefixLookup& p, const CutSlab<W>& cut, W front, W length,
                                    Slab<W> part) {
@@ -232,7 +232,7 @@ HWY_INLINE Slab<W> finish_straight(const PrefixLookup& p, const CutSlab<W>& cut,
     return part;
 }
 
-/// The largest premultiplied colour an opacity allows.
+/// The largest premultiplied colour that an opacity allows.
 template <class W>
 HWY_INLINE W largest_color(const PremultipliedRules& r, W alpha) {
     return r.finer >= 0 ? shift_left(alpha, r.finer) : floor_shift(alpha, -r.finer);
@@ -270,7 +270,7 @@ HWY_INLINE Slab<W> finish_premultiplied(const PrefixLookup& p, const Premultipli
     }
     return part;
 }
-/// Slabs shorter than a step.
+/// Classifies slabs shorter than a step.
 template <class W>
 HWY_INLINE auto is_shorter(const EntryLookup& e, W length) {
     return length < constant<W>(std::int64_t{1} << e.length_fraction);

@@ -14,8 +14,8 @@ namespace squint {
 
 namespace {
 
-// A straight T errs by half the change of extinction over a row in a slab of one last bit at its end, and a
-// ray along which the field is even meets that slab again and again.
+// A straight T errs by half the change of extinction over a row, in a slab of one last bit at the row's end.
+// A ray along which the field is even meets that slab again and again.
 double lost_by_straight_lines(const Entries& rows, double step, double longest_ray) {
     double worst = 0;
     for (int i = 0; i + 1 < rows.size(); ++i) {
@@ -34,16 +34,16 @@ double lost_by_straight_lines(const Entries& rows, double step, double longest_r
 EntryRows rows_for_color(const ClassificationInputs& in, int most_rows) {
     double worst = largest_swing(in.entries.entry) * 2 / 3;
     if (worst <= kInsideEntry) return {0, 255 * worst};
-    worst = kInsideEntry;  // and no less: one row is enough for that
+    worst = kInsideEntry;  // never less: one row is enough for that
     for (int i = 0; i + 1 < in.entries.size(); ++i) {
         const Entry &a = in.entries.entry[static_cast<std::size_t>(i)],
                     &b = in.entries.entry[static_cast<std::size_t>(i) + 1];
         const double swing = std::max({std::abs(b.color.x - a.color.x), std::abs(b.color.y - a.color.y),
                                        std::abs(b.color.z - a.color.z)});
-        // The mean weighted by extinction is at most two thirds of the swing away from either end, and so is
-        // that of a ray of such slabs.
+        // A mean weighted by extinction differs by at most two thirds of the swing from either end, and so
+        // does the colour of a ray of such slabs.
         const double depth = std::max(a.extinction, b.extinction) * in.step_world * in.longest_ray;
-        if (swing * 2 / 3 * std::min(depth, 1.0) > worst)  // more than the opacity can make of it
+        if (swing * 2 / 3 * std::min(depth, 1.0) > worst)  // more than its opacity allows
             worst = std::max(worst, swing * 2 / 3 * -portable::expm1(-depth));
     }
     int bits = 0;
@@ -73,7 +73,7 @@ PrefixLookup build_prefix_lookup(const ClassificationInputs& in, int sub_entry_b
     p.sub_entry_bits = sub_entry_bits;
     const auto extinction_of = [&](int i) { return fine.entry[static_cast<std::size_t>(i)].extinction; };
     std::vector<double> depths(static_cast<std::size_t>(rows));
-    double sum = 0;  // trapezoids: exact for a linear extinction
+    double sum = 0;  // trapezoids: exact for linear extinction
     for (int i = 0; i + 1 < rows; ++i) {
         const double a = extinction_of(i), b = extinction_of(i + 1);
         sum += 0.5 * (a + b);

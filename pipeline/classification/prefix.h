@@ -1,5 +1,5 @@
-// What the pre-integrated methods share: the prefix sum T of the entries' optical depths, and opaque
-// prediction. Lee & Shin, equation 8 and section 4.2, as corrected (docs/classification.md).
+// Shared by pre-integrated methods: the prefix sum T of the entries' optical depths, and opaque prediction.
+// Lee & Shin, equation 8 and section 4.2, as corrected (docs/classification.md).
 #pragma once
 
 #include "pipeline/classification/entries.h"
@@ -9,28 +9,28 @@
 
 namespace squint {
 
-/// T at every entry, for one full step a unit of the coordinate, and the nearest opaque entries.  Between
-/// entries T is evaluated exactly, with the fraction bits that takes, and rounded with the slab's depth
-/// alone.
+/// T at every entry, for one full step per unit of the coordinate, and the nearest opaque entries.  Between
+/// entries T is computed exactly, with as many fraction bits as that takes; only the slab's depth is
+/// rounded.
 struct PrefixLookup {
     EntryLookup entries;
-    Table depth;                 // T[i]; where `curved`, also the change of extinction to the next row
+    Table depth;                 // T[i]; where `curved`, also the change of extinction up to the next row
     int sub_entry_bits = 0;      // 2^bits rows an entry
-    bool curved = false;         // T bends between rows: extinction is linear there; else straight
-    std::int64_t total = 0;      // the last T; rounding a bend may pass it by a part of a last bit
-    std::int64_t most_rise = 0;  // of T from row to row
+    bool curved = false;         // T bends between rows, because extinction is linear there
+    std::int64_t total = 0;      // the last T; rounding a bend may exceed it by part of a last bit
+    std::int64_t most_rise = 0;  // the most that T rises from row to row
     Rescale to_depth;            // slab's depth: (T(b) - T(f)) / |s_b - s_f|
     Rescale to_shorter;          // times the slab's length
-    Rescale to_wall;             // colour in front of a wall over the wall's
+    Rescale to_wall;             // the colour in front of a wall over the wall's
     Approximation straight;      // of T, where it does not bend
     bool predicts = false;
-    Table walls;  // up, down: the nearest opaque entry at or above, at or below; absent where none is opaque
+    Table walls;  // up, down: the nearest opaque entry at or above, at or below; absent if none is opaque
 
     template <class V>
     void visit(V&& v) {
         entries.visit(v), v(depth), v(to_depth), v(to_shorter), v(to_wall), v(walls);
     }
-    /// Fraction bits of a place between two rows, and those that T gains there.
+    /// Fraction bits of a place between two rows, which T gains there.
     int place_bits() const { return entries.input_fraction - sub_entry_bits; }
     int gained_bits() const { return curved ? 2 * place_bits() + 1 : place_bits(); }
     void describe(ClassificationReport& report) const {
@@ -56,10 +56,10 @@ PrefixLookup build_prefix_lookup(const ClassificationInputs& inputs, int sub_ent
 EntryRows rows_for_color(const ClassificationInputs& inputs, int most_rows);
 inline constexpr double kInsideEntry = 2.0 / 255;
 
-/// PIPS(n) or LEG(n) as the settings ask, without rounding.
+/// PIPS(n) or LEG(n), as the settings ask, without rounding.
 std::shared_ptr<const preintegration::ExactSeries> exact_series_of(const ClassificationInputs& inputs);
 
-/// What methods with premultiplied colours share.
+/// Shared by methods with premultiplied colours.
 struct PremultipliedRules {
     Rescale to_product;  // a straight colour times an opacity
     Rescale to_scaled;   // a colour times another opacity over its own

@@ -6,8 +6,8 @@
 namespace squint::preintegration {
 namespace {
 
-/// The part of a slab that ends at the middle, seen from its other end: t = depth - u.  Its own `depth`
-/// bounds what cancels.
+/// The part of a slab that ends at the middle, seen from its other end: t = depth - u.  Cancellation is
+/// bounded by its own `depth`.
 Moments towards_middle(const Moments& about_middle, int count) {
     Moments result;
     result.depth = about_middle.depth;
@@ -37,8 +37,8 @@ void scale(Moments& moments, double rate, int count) {
     for (int k = 0; k < count; ++k, factor *= rate) moments.q[k] *= factor;
 }
 
-/// Fills one entry's value from its neighbour nearer to the middle; `step` is entry i's moment over the entry
-/// between them.
+/// Fills an entry's value from its neighbour nearer to the middle; `step` is the moment of entry i over the
+/// entry between them.
 struct LevelBuilder {
     DisjointTables::Level& level;
     const PrefixTables& tables;
@@ -50,7 +50,7 @@ struct LevelBuilder {
         level.depth[to] = level.depth[from] + tables.partial_depth(piece, 0, 1);
         for (int k = 0; k < count; ++k) {
             const double offset = level.depth[from];
-            // Downwards T - T_m is negative and so is dT.
+            // Downwards T - T_m is negative, and so is dT.
             const Vec3 step = up           ? tables.partial_moments(piece, 0, 1, k, offset)
                               : k % 2 == 0 ? -tables.partial_moments(piece, 1, 0, k, -offset)
                                            : tables.partial_moments(piece, 1, 0, k, -offset);

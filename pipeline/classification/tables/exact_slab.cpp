@@ -15,9 +15,9 @@ constexpr std::array<double, 4> kNode = {0.1834346424956498, 0.5255324099163290,
 constexpr std::array<double, 4> kWeight = {0.3626837833783620, 0.3137066458778873, 0.2223810344533745,
                                            0.1012285362903763};
 
-constexpr double kSpentDepth = 50;  // e^-50 = 2e-22: what lies behind adds less than a rounding
+constexpr double kSpentDepth = 50;  // e^-50 = 2e-22: what lies behind adds less than rounding does
 
-/// A stretch between two neighbouring entries: everything linear over `length` world units.
+/// The part of a slab between two neighbouring entries: everything is linear over `length` world units.
 struct Stretch {
     double tau0, tau1;
     Vec3 color0, color1;
@@ -29,7 +29,7 @@ struct Stretch {
     }
 };
 
-/// Light of the stretch that reaches its front, with `behind` optical depth in front of it.
+/// The light of that part which reaches its front, with `behind` optical depth in front of it.
 Vec3 light(const Stretch& stretch, double behind) {
     const double deepest = std::max(stretch.tau0, stretch.tau1) * stretch.length;
     const int pieces = std::max(1, static_cast<int>(std::ceil(2 * std::min(deepest, 1e6))));

@@ -98,7 +98,7 @@ SlabValue LegendreSeries::in_pieces(double front, double back, double length, do
         here = next;
     }
     result.alpha = -portable::expm1(-depth);
-    // Behind the last piece: at most kSpent, in the colour so far.
+    // What lies behind the last piece is at most kSpent: it gets the colour so far.
     if (1 - through > 0) result.color *= result.alpha / (1 - through);
     return result;
 }

@@ -15,13 +15,13 @@ namespace HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
-using Tag = hn::CappedTag<double, 4>;  // red, green, blue, and one that is nobody's
+using Tag = hn::CappedTag<double, 4>;  // red, green, blue, and an unused lane
 using V = hn::Vec<Tag>;
 constexpr Tag kTag;
 constexpr int kLanes = static_cast<int>(HWY_MIN(HWY_LANES(double), 4)), kVectors = 4 / kLanes;
 
-/// x / 6, rounded once: where products and sums come fused, the quotient's rest corrects a product with 1/6
-/// (Markstein 1990), in a quarter of a division's time.
+/// x / 6, rounded once.  Where multiply-add is fused, the remainder corrects a product with 1/6 (Markstein
+/// 1990), in a quarter of a division's time.
 V sixth_of(V x) {
 #if HWY_NATIVE_FMA
     const V sixth = hn::Set(kTag, 1.0 / 6), guess = hn::Mul(x, sixth);
@@ -37,7 +37,7 @@ void WriteLightSums(std::span<const Entry> entries, double step, double* sums) {
     for (int v = 0; v < kVectors; ++v) {
         const auto color = [&](std::size_t i) { return hn::LoadU(kTag, &entries[i].color.x + v * kLanes); };
         V sum = hn::Zero(kTag), before = color(0), tau_before = hn::Set(kTag, entries[0].extinction);
-        // Several vectors share a row: each leaves what is not its own as it is, but for what comes next.
+        // Several vectors share a row: each keeps what it does not own, or what comes next overwrites it.
         const int own = std::min(kLanes, 3 - v * kLanes);
         const auto put = [&](double* row) {
             if (kVectors == 1 || own == kLanes) return hn::StoreU(sum, kTag, row + v * kLanes);
@@ -82,7 +82,7 @@ double LargestSwing(std::span<const Entry> entries) {
 
 std::int32_t JoinRows(const std::int32_t* depth, int stride, const std::int32_t* light, int rows,
                       std::int32_t* joined) {
-    // Three words and the next row's first, whose place is the next row's depth.
+    // Three words and the first of the next row, which that row's depth overwrites.
     const hn::CappedTag<std::int32_t, 4> four;
     const bool at_once = hn::MaxLanes(four) == 4;
     for (int i = 0; i < rows; ++i) {

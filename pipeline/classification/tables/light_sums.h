@@ -1,4 +1,4 @@
-// X1, the prefix sums of colour over depth, and their rise from row to row, in vectors.
+// Prefix sums X1 of colour over depth, and how much they rise from row to row, with SIMD.
 #pragma once
 
 #include "core/transfer_function.h"
@@ -8,15 +8,15 @@
 
 namespace squint {
 
-/// sums[3 i + c]: what channel c's light of all entries before entry i amounts to for a step of one entry,
-/// `step` long; every sum in order, an entry at a time.  One number behind the last is written, too.
+/// sums[3 i + c]: the light in channel c of all entries before entry i, for a step of one entry that is
+/// `step` long.  Sums run in order, an entry at a time.  One number after the last is written, too.
 void write_light_sums(std::span<const Entry> entries, double step, double* sums);
 
-/// The largest change of a colour's channel from an entry to the next.
+/// The largest change of a colour channel between neighbouring entries.
 double largest_swing(std::span<const Entry> entries);
 
-/// Rows of T and X1 side by side from their own tables' rows of `stride` and three words.  The largest rise
-/// of any from a row to the next.
+/// Writes rows of T and X1 side by side, from rows of `stride` words and of three words.  Returns the largest
+/// rise of any of them between rows.
 std::int32_t join_rows(const std::int32_t* depth, int stride, const std::int32_t* light, int rows,
                        std::int32_t* joined);
 

@@ -17,8 +17,8 @@ using V = hn::Vec<Tag>;
 constexpr Tag kTag;
 constexpr int kLanes = static_cast<int>(HWY_LANES(double));
 
-/// One lane for every column, a few vectors a row.  A lane's sum grows by its entry's depth or light times
-/// the mean of t^k over the entry, k being the lane's moment.
+/// One lane for each column, a few vectors a row.  A lane's sum grows by the depth or light of its entry
+/// times the mean of t^k over the entry, where k is the lane's moment.
 template <int kOrder>
 void write_rows(const MomentSteps& steps, int first, int end, double unit, int word_fraction,
                 std::int32_t* HWY_RESTRICT words) {

@@ -1,4 +1,4 @@
-// Rows of the moments' level tables, a block at a time, in vectors: the words of MomentSeries::moments.
+// Writes rows of the moments' level tables, a block at a time, with SIMD: the words of MomentSeries::moments.
 #pragma once
 
 #include <cstddef>
@@ -8,8 +8,8 @@
 
 namespace squint {
 
-/// The entries as the tables take them, one behind the other: depth, then each channel's light, then the
-/// light again for every further moment; `padded` numbers an entry.
+/// The entries as the tables take them, one after the other: depth, then the light of each channel, then that
+/// light again for each further moment; an entry is `padded` numbers.
 struct MomentSteps {
     static constexpr int kPadded = 16;  // 1 + 3 * 5, the most orders
     int order = 2;
@@ -21,9 +21,9 @@ struct MomentSteps {
     }
 };
 
-/// Writes the words of a block's rows, entries first <= i < end, from its start on: `end - first` + 1 rows of
-/// 1 + 3 order words of `word_fraction` bits, rounded to nearest, halves to even.  `unit` turns depths into
-/// the block's.  Up to kPadded words behind the last are written, too.
+/// Writes the words of a block's rows from its start on, for entries first <= i < end: `end - first` + 1 rows
+/// of 1 + 3 order words with `word_fraction` bits, rounded to nearest, halves to even.  `unit` turns depths
+/// into the block's units.  Writes up to kPadded words after the last.
 void write_moment_rows(const MomentSteps& steps, int first, int end, double unit, int word_fraction,
                        std::int32_t* words);
 

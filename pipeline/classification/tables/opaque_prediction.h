@@ -1,6 +1,6 @@
-// Where a slab first meets an opaque entry (Lee & Shin, section 4.2, with the three faults of its table P
-// mended: both directions, inclusive tests, and the rate d / |s_b - s_f| of the whole slab kept for the
-// shortened one).
+// Finds where a slab first meets an opaque entry: Lee & Shin, section 4.2, with three faults of its table P
+// corrected: it looks in both directions, its tests include the ends, and the shortened slab keeps the rate d
+// / |s_b - s_f| of the whole one.
 #pragma once
 
 #include "pipeline/classification/tables/linear_entries.h"
@@ -12,18 +12,18 @@ namespace squint::preintegration {
 struct OpaquePrediction {
     std::vector<int> up;    // up[i]: the nearest opaque entry >= i; size() where there is none
     std::vector<int> down;  // down[i]: the nearest opaque entry <= i; -1 where there is none
-    bool any = false;       // false: the prediction can be left out of the pipeline
+    bool any = false;       // false: nothing is opaque, and the pipeline leaves prediction out
 
-    /// The coordinate where the way from `front` to `back` (both ends included) first meets an opaque one.
+    /// The first opaque coordinate on the way from `front` to `back`, both ends included.
     std::optional<double> first(double front, double back) const;
 };
 
 OpaquePrediction predict_opaque(const Entries& entries);
 
-/// A slab cut at its first opaque coordinate: its translucent part, and the wall behind it.
+/// A slab cut at its first opaque coordinate: a translucent part, and the wall behind it.
 struct RealCutSlab {
     double front, back,
-        length;  // the part before the wall, with the whole slab's rate; length 0 when the front is opaque
+        length;  // of the part before the wall, at the whole slab's rate; 0 when the front is opaque
     bool wall = false;
     Vec3 wall_color{0, 0, 0};
 
@@ -31,7 +31,7 @@ struct RealCutSlab {
     SlabValue over_wall(const SlabValue& part) const;
 };
 
-/// Clamps both ends to the entries and cuts.
+/// Clamps both ends to the entries, and cuts the slab.
 RealCutSlab cut_at_opaque(const Entries& entries, const OpaquePrediction& prediction, double front,
                           double back, double length);
 

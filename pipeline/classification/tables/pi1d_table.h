@@ -1,12 +1,12 @@
-// PI1D: one-dimensional tables for one slab length, without self-attenuation inside the slab.
-//   kye:   opacities a_i = 1 - exp(-tau_i d); alpha = mean of a_i, C = mean of a_i c_i over the slab (Kye et
-//   al. 2008): the
-//          arithmetic mean of opacity in place of the geometric mean of transparency.  A wall one entry thin
-//          among n gives 1/n.
-//   engel: tau_i d clamped to 1; x = mean of tau_i d, alpha = 1 - exp(-x), C = mean of tau_i d c_i, never
-//   above alpha
-//          (Engel 2003, as described by Lee & Shin, section 3.3).
-// Means run over the linear interpolant of the entries' values; a slab inside one point has that point's
+// PI1D: one-dimensional tables for slabs of one length, without self-attenuation inside the slab.
+//
+//   kye     a_i = 1 - exp(-tau_i d);   alpha = mean of a_i,    C = mean of a_i c_i       (Kye et al. 2008)
+//   engel   v_i = min(tau_i d, 1);     x = mean of v_i,   alpha = 1 - exp(-x),   C = mean of v_i c_i <= alpha
+//           (Engel 2003, as described by Lee & Shin, section 3.3)
+//
+// kye takes the arithmetic mean of opacity in place of the geometric mean of
+// transparency: a wall one entry thin among n gives 1/n.  Means run over the linear
+// interpolant of the entries' values.  A slab inside one point has that point's
 // value.
 #pragma once
 
@@ -32,7 +32,7 @@ struct RealPreIntegrated1D {
 /// prediction cuts the slab.
 RealPreIntegrated1D build_pi1d(const Entries& entries, double length, MeanOf mean);
 
-/// The same matter over `ratio` times the length it was integrated for; opaque stays opaque.
+/// The same matter over `ratio` times the length it was integrated for; what is opaque stays so.
 SlabValue with_length_ratio(const SlabValue& slab, double ratio);
 
 }  // namespace squint::preintegration

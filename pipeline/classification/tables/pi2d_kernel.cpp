@@ -24,12 +24,12 @@ V constant(double value) {
     return hn::Set(kTag, value);
 }
 
-/// a + b c, with two roundings on every target.
+/// a + b c, rounded twice on every target.
 V plus_product(V a, V b, V c) {
     return hn::Add(a, hn::Mul(b, c));
 }
 
-/// value of the polynomial with these coefficients, lowest first.
+/// The value of the polynomial with these coefficients, lowest first.
 template <class... Higher>
 V polynomial(V x, double lowest, Higher... higher) {
     if constexpr (sizeof...(higher) == 0)
@@ -53,12 +53,12 @@ V decay(V x) {
     return hn::BitCast(kTag, hn::Add(hn::BitCast(bits, p), hn::ShiftLeft<52>(hn::BitCast(bits, shifted))));
 }
 
-// The mean transparency of a stretch whose depth per length is a and b at its ends, x = (a + b) / 2, y = (b -
-// a) / 2, is
+// The mean transparency of a stretch whose depth per length is a and b at its ends, with x = (a + b) / 2 and
+// y = (b - a) / 2, is
 //   M(x, y) = int_0^1 exp(-x u + y u (1 - u)) du = e^(-x/2) Q(x^2, y),   Q = sum_jk q_jk x^(2j) y^k,
-//   q_jk = 2^-(2j+2k+1) / ((2j)! (j+1/2) (j+3/2) ... (j+k+1/2))          (v = u - 1/2, cosh and exp by their
-//   series).
-// From the other side y changes sign.
+//   q_jk = 2^-(2j+2k+1) / ((2j)! (j+1/2) (j+3/2) ... (j+k+1/2))
+// (substitute v = u - 1/2, then expand cosh and exp).
+// Seen from the other side, y changes sign.
 constexpr double q(int j, int k) {
     double value = 0.5;
     for (int i = 0; i < j + k; ++i) value /= 4;
@@ -93,7 +93,7 @@ struct UpToOne {
     }
 };
 
-/// a, b <= 1/16, where nearly all diagonals of a large table are: the largest term left out is 2e-9 (x^2
+/// a, b <= 1/16, which covers nearly all diagonals of a large table: the largest term left out is 2e-9 (x^2
 /// y^2).
 struct UpToASixteenth {
     static Means means(V a, V b) {
@@ -110,7 +110,7 @@ double first_lane(V v) {
     return hn::GetLane(v);
 }
 
-/// Mean transparency for any depth, by pieces of depth <= 1; what lies behind a depth of 40 is dropped.
+/// The mean transparency at any depth, by pieces of depth <= 1; beyond a depth of 40 nothing is added.
 double mean_of_any_depth(double from, double to) {
     const int pieces = std::max(1, static_cast<int>(std::ceil(std::max(from, to))));
     const double h = 1.0 / pieces;

@@ -1,28 +1,28 @@
-// The vector loops of PI2D's exact O(n^2) build: double arithmetic without contraction, compiled once
-// per SIMD target, so every target gives the same bits.
+// Vector loops of PI2D's exact O(n^2) build.  Double arithmetic without contraction, compiled once per SIMD
+// target: every target gives the same bits.
 #pragma once
 
 #include <array>
 #include <cstddef>
 
-// Loops run over whole vectors: every array of doubles but encode_u16's has kPadding readable and writable
-// values behind its last one.
+// Loops run over whole vectors: after its last value every array of doubles, except that of encode_u16, has
+// kPadding values that can be read and written.
 
 namespace squint::preintegration {
 
 inline constexpr int kPadding = 16;
 
-/// `count` stretches between count + 1 nodes, seen at one rate.  All arrays are the caller's.
+/// `count` stretches between count + 1 nodes, at one rate.  The caller owns all arrays.
 struct Stretches {
     int count = 0;
     const double* width = nullptr;         // in entries
     const double* extinction = nullptr;    // at the nodes
     std::array<const double*, 3> color{};  // at the nodes
     double* transparency = nullptr;        // E_i, out
-    std::array<double*, 3> up{}, down{};   // K_i entered from the lower node, from the higher node, out
+    std::array<double*, 3> up{}, down{};   // out: K_i entered from the lower node, from the higher
 };
 
-/// E_i = e^-x and K_i, exact to 1e-9 for any depth.  `deepest` is the largest extinction times width of any
+/// E_i = e^-x and K_i, exact to 1e-9 for any depth.  `deepest` is the largest extinction times width of a
 /// stretch.
 void solve_stretches(const Stretches& stretches, double rate, double deepest);
 

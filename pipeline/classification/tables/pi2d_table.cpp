@@ -17,14 +17,14 @@
 namespace squint::preintegration {
 namespace {
 
-/// The function cut at the table's nodes and at the entries: between two neighbouring points everything is
-/// linear.
+/// The function cut at the table's nodes and at the entries: everything is linear between two neighbouring
+/// points.
 struct Grid {
     int size = 0;               // nodes
     double spacing = 0;         // entries from node to node
     double length = 0;          // world units
     int stretches = 0;          // one less than points
-    std::vector<double> width;  // of the stretch behind each point, in entries
+    std::vector<double> width;  // of the stretch after each point, in entries
     std::vector<double> extinction;
     Channels color;
     std::vector<char> wall;         // the point is opaque
@@ -38,7 +38,7 @@ struct Grid {
     bool one_stretch_per_node() const { return stretches == size - 1; }
 };
 
-/// Exact on entries, so that a node there meets a wall that stands there.
+/// Exact on entries, so that a node on an entry meets the wall of that entry.
 double node_coordinate(int node, int size, int entries) {
     return static_cast<double>(static_cast<std::int64_t>(node) * (entries - 1)) / (size - 1);
 }
@@ -94,7 +94,7 @@ Grid make_grid(const Entries& entries, int size, double length) {
     return grid;
 }
 
-/// K and E of the stretches, or of the stretches joined from node to node.
+/// K and E of the stretches, or of stretches joined from node to node.
 struct Terms {
     std::vector<double> up_transparency, down_transparency;
     Channels up, down;
@@ -137,7 +137,7 @@ class DiagonalSolver final : public Pi2dDiagonal {
   private:
     const Terms& terms() const { return grid_.one_stretch_per_node() ? fine_ : joined_; }
 
-    /// Cells (f, f): the point itself over the slab's length.
+    /// The diagonal (f, f): the point itself over the slab's length.
     void solve_points() {
         for (int j = 0; j < grid_.size; ++j) {
             const int point = grid_.node[j];
@@ -165,7 +165,7 @@ class DiagonalSolver final : public Pi2dDiagonal {
         if (!grid_.one_stretch_per_node()) join_stretches();
     }
 
-    /// A stretch that arrives at a wall ends in its colour and lets nothing through.
+    /// A stretch that arrives at a wall ends in the wall's colour and lets nothing through.
     void close_stretches_at_walls() {
         for (int i = 0; i < grid_.stretches; ++i) {
             if (grid_.wall[i + 1]) {
@@ -200,7 +200,7 @@ class DiagonalSolver final : public Pi2dDiagonal {
         }
     }
 
-    /// Slabs with a wall on their way are opaque and lose nothing at their back.
+    /// Slabs that meet a wall are opaque and lose nothing at their back.
     void hide_behind_walls(int m, int count) {
         for (int f = 0; f < count; ++f) {
             const bool up_wall = grid_.walls_to[f + m] > grid_.walls_to[f];
@@ -226,8 +226,8 @@ class DiagonalSolver final : public Pi2dDiagonal {
         return same ? terms().up_transparency.data() : terms().down_transparency.data();
     }
 
-    /// K_f - P_f K_(f + m) upwards, and the same from the other side; nothing is dropped at the first slab of
-    /// full length.
+    /// K_f - P_f K_(f + m) upwards, and the same from the other side; at the first slab of full length there
+    /// is nothing to subtract.
     void start_lights(int m, int count) {
         const double* const slab_down = grid_.any_wall ? down_transparency_.data() : transparency_.data();
         for (int k = 0; k < 3; ++k) {
@@ -265,7 +265,7 @@ class DiagonalSolver final : public Pi2dDiagonal {
         }
     }
 
-    /// Rounding may leave a colour 1e-12 outside.
+    /// Rounding can put a colour 1e-12 outside.
     static double within(double color, double alpha) { return std::min(std::max(color, 0.0), alpha); }
 
     const Grid& grid_;
@@ -286,7 +286,7 @@ RealPreIntegrated2D empty_table(const Entries& entries, int size, double length)
     return table;
 }
 
-/// Fills every cell with `slab(front, back)`.
+/// Fills every node with `slab(front, back)`.
 template <class SlabOf>
 void fill(RealPreIntegrated2D& table, const SlabOf& slab) {
     oneapi::tbb::parallel_for(0, table.size, [&](int f) {

@@ -1,14 +1,14 @@
-// PI2D: the slab integral tabulated over (front, back) for one slab length (Engel et al. 2001), size x size
-// cells of (red, green, blue, alpha), premultiplied.  Cell (f, b) is at ((f * size) + b) * 4; node j stands
-// at coordinate j (entries - 1) / (size - 1).
+// PI2D: the slab integral tabulated over (front, back) for slabs of one length (Engel et al. 2001), size x
+// size nodes of (red, green, blue, alpha), premultiplied.  Node (f, b) is stored at ((f * size) + b) * 4;
+// node j lies at coordinate j (entries - 1) / (size - 1).
 //
 // The exact table in O(size^2).  All slabs |b - f| = m share one rate r = length / |b - f|, so a diagonal is
-// one problem.  With K_i and E_i the light and the transparency of the stretch from node i to i + 1 at that
-// rate, and P the slab's transparency,
+// one problem.  Let K_i and E_i be the light and the transparency of the stretch from node i to i + 1 at that
+// rate, and P the slab's transparency; then
 //   C(f, f + m) = E_f C(f + 1, f + 1 + m) + K_f - P(f, f + m) K_(f + m).
-// Nothing is divided and E <= 1, so rounding never grows: the table is within 1e-9 of the exact integral.  K
-// needs only the mean transparency M of a stretch: C = c_0 (1 - M) + c_1 (M - E) for linear c and tau (by
-// parts), and M is a short polynomial.
+// There is no division and E <= 1, so rounding never grows: the table is within 1e-9 of the exact integral.
+// K needs only the mean transparency M of a stretch: integrating by parts, C = c_0 (1 - M) + c_1 (M - E) for
+// linear c and tau, and M is a short polynomial.
 #pragma once
 
 #include "pipeline/classification/tables/linear_entries.h"
@@ -28,16 +28,16 @@ enum class Lookup { nearest, bilinear };
 struct RealPreIntegrated2D {
     int size = 0;
     int entries = 0;
-    double length = 1;           // world units: the cells are for slabs of this length
+    double length = 1;           // world units: the table is for slabs of this length
     std::vector<double> cell{};  // size * size * 4
     Lookup lookup = Lookup::bilinear;
 
     /// A slab of another length keeps its colour and takes alpha' = 1 - (1 - alpha)^(slab_length / length):
-    /// exact in alpha, but self-attenuation stays that of `length`.
+    /// exact in alpha, but with the self-attenuation of `length`.
     SlabValue slab(double front, double back, double slab_length) const;
 };
 
-/// Straight from the definition, one exact_slab per cell, O(size^2 entries): the oracle.
+/// From the definition, one exact_slab for each node, O(size^2 entries): the oracle.
 RealPreIntegrated2D build_pi2d_direct(const Entries& entries, int size, double length);
 
 /// Alpha exact, colour without self-attenuation: C = r (X_1(b) - X_1(f)) (Engel 2001; Lee & Shin, equation
@@ -47,11 +47,11 @@ RealPreIntegrated2D build_pi2d_without_self_attenuation(const Entries& entries, 
 /// The exact table in O(size^2), in double.
 RealPreIntegrated2D build_pi2d(const Entries& entries, int size, double length);
 
-/// Computes diagonals; one per thread.
+/// Computes diagonals.  Each thread has one.
 class Pi2dDiagonal {
   public:
-    /// After solve(m), index f in [0, size - m): up(k)[f] is cell (f, f + m), down(k)[f] cell (f + m, f); k =
-    /// 0, 1, 2 colour, 3 alpha.
+    /// After solve(m), for f in [0, size - m), up(k)[f] is node (f, f + m) and down(k)[f] is node (f + m, f);
+    /// k = 0, 1, 2 are colours, 3 is alpha.
     virtual void solve(int m) = 0;
     virtual const double* up(int k) const = 0;
     virtual const double* down(int k) const = 0;
@@ -66,7 +66,7 @@ using DiagonalGroup =
     std::function<void(int first, int count, Pi2dDiagonal& diagonal, std::vector<std::byte>& scratch)>;
 void for_each_diagonal_group(const Entries& entries, int size, double length, const DiagonalGroup& group);
 
-/// The exact table in O(size^2), written as words of any kind into `cells` (size * size * 4, may be reused).
+/// The exact table in O(size^2), written as words of any type into `cells` (size * size * 4 words).
 /// `encode(channel, values, words)` turns a span of doubles in [0, 1] into as many words; channel 3 is alpha.
 template <class Word, class Encode>
 void build_pi2d_words(const Entries& entries, int size, double length, std::span<Word> cells,
@@ -78,7 +78,7 @@ struct EncodeU16 {
     void operator()(int channel, std::span<const double> values, std::span<std::uint16_t> words) const;
 };
 
-// --------------------------------------------------------------------------------------------------------------------------
+// -----------------------------------------------------------------------------------------------------------
 
 template <class Word, class Encode>
 void build_pi2d_words(const Entries& entries, int size, double length, std::span<Word> cells,
@@ -88,7 +88,7 @@ void build_pi2d_words(const Entries& entries, int size, double length, std::span
     };
     Cell* const table = reinterpret_cast<Cell*>(cells.data());
     const auto group = [&](int first, int count, Pi2dDiagonal& diagonal, std::vector<std::byte>& scratch) {
-        // Encode each diagonal, then write cells row by row, so that a row's neighbours go out together.
+        // Encode each diagonal, then write row by row, so that the nodes of a row are written together.
         const std::size_t plane = size;
         scratch.resize(plane * (4 * sizeof(Word) + 2 * kDiagonalsPerGroup * sizeof(Cell)));
         Cell* const lanes = reinterpret_cast<Cell*>(scratch.data());

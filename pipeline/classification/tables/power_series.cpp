@@ -59,8 +59,8 @@ ColorRange color_range(const Entries& entries) {
 
 Verdict judge_power_series(const Entries& entries, int order, double length) {
     if (order == 1) return {};
-    // Slabs one entry long at the far end of the table: (r T)^n with r = length, relative error 2^-53 of each
-    // prefix.
+    // Slabs one entry long at the far end of the table: (r T)^n with r = length, and a relative error of
+    // 2^-53 in each prefix.
     const double scale = length * total_depth(entries);
     const double lost = std::ldexp(std::pow(scale, order), -53);
     std::ostringstream reason;

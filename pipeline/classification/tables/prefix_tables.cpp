@@ -110,7 +110,7 @@ double PrefixTables::coordinate_at(double target) const {
     const int i = static_cast<int>(above - depth.begin()) - 1;
     const double t = target - depth[i];
     if (between == Between::piecewise) return i + t / (depth[i + 1] - depth[i]);
-    // tau_0 u + (tau_1 - tau_0) u^2 / 2 = t, in the form that does not cancel.
+    // Solves tau_0 u + (tau_1 - tau_0) u^2 / 2 = t in the form that does not cancel.
     const double tau = extinction[i], slope = extinction[i + 1] - tau;
     const double root = std::sqrt(std::max(tau * tau + 2 * slope * t, 0.0));
     return i + std::min(2 * t / (tau + root), 1.0);
@@ -148,8 +148,8 @@ Moments PrefixTables::moments(double front, double back, double length, int coun
 
 namespace {
 
-/// Steps of T, X_1 and X_2 over one entry, tau and c linear: closed forms, so that the tables of PIPS(1) and
-/// LEG(2) build fast.
+/// Steps of T, X_1 and X_2 over one entry with linear tau and c, in closed form, so that the tables of
+/// PIPS(1) and LEG(2) build fast.
 struct Step {
     double tau0, tau1, depth, square;  // square = int t^2 du, t the depth from the entry's start
 

@@ -1,9 +1,9 @@
 // One-dimensional prefix tables of a transfer function: entries -> T, X_1 ... X_n at every entry, in double.
 //   T(s)   = int_0^s tau ds             (trapezoid: exact for linear tau)
-//   X_k(s) = int_0^s c d(T^k)           (exact for linear tau and c; X_1 by MATH's product formula)
-// Lee & Shin, equations 15 to 25, without the half-entry shift of their rectangles.  s in entries, tau per
+//   X_k(s) = int_0^s c d(T^k)           (exact for linear tau and c)
+// Lee & Shin, equations 15 to 25, without the half-entry shift of their rectangles.  s is in entries, tau per
 // world unit: a slab's optical depth is x = r (T(b) - T(f)) with the rate r = length / (back - front), in
-// entries per world unit's inverse.
+// world units per entry.
 #pragma once
 
 #include "pipeline/classification/tables/linear_entries.h"
@@ -12,24 +12,24 @@ namespace squint::preintegration {
 
 inline constexpr int kMostMoments = 5;
 
-/// How T and X_k run between two entries.  `exact`: tau and c linear, as everywhere.  `piecewise`: T linear
-/// and the colour of the entry constant, X_k(s) = X_k[i] + piece_color (T(s)^k - T_i^k): what one lerp and
-/// one product of a stage can do.
+/// How T and X_k run between two entries.  `exact`: tau and c are linear, as everywhere.  `piecewise`: T is
+/// linear and the colour of an entry constant, X_k(s) = X_k[i] + piece_color (T(s)^k - T_i^k): what one lerp
+/// and one product of a stage can compute.
 enum class Between { exact, piecewise };
 
-/// Moments of one slab about its front, in its own optical depth t: depth x, and q[k] = int c t^k dt over t
-/// in [0, x].
+/// Moments of one slab about its front, in its own optical depth t: the depth x, and q[k] = int c t^k dt over
+/// t in [0, x].
 struct Moments {
     double depth = 0;
     std::array<Vec3, kMostMoments> q;
 
     Moments() { q.fill(Vec3(0, 0, 0)); }
 
-    /// Puts `behind` at this one's back, `count` moments: sums of positive terms.
+    /// Appends the slab `behind`, `count` moments: sums of positive terms.
     void append(const Moments& behind, int count);
 };
 
-/// int c tau du over an entry along which both run linearly: X_1's step.
+/// int c tau du over an entry along which both are linear: the step of X_1.
 inline double colored_depth(double c0, double tau0, double c1, double tau1) {
     return (2 * c0 * tau0 + 2 * c1 * tau1 + c0 * tau1 + c1 * tau0) / 6;
 }
@@ -48,24 +48,24 @@ struct PrefixTables {
     double depth_at(double s) const;
     Vec3 moment_at(int k, double s) const;
 
-    /// T(b) - T(f) and X_1(b) - X_1(f), as sums of whole entries and two fractions: no cancellation inside
+    /// T(b) - T(f) and X_1(b) - X_1(f), as sums of whole entries and two fractions: nothing cancels inside
     /// one entry.
     double depth_between(double front, double back) const;
     Vec3 moment_between(double front, double back) const;
 
-    /// The coordinate at which T reaches `depth`, 0 <= depth <= total_depth(); the first such one.
+    /// The first coordinate at which T reaches `depth`, 0 <= depth <= total_depth().
     double coordinate_at(double depth) const;
 
-    /// Moments q[0 .. count-1] of the slab, front != back.  Inside one entry they are integrated; across
-    /// entries q[k >= 1] is the difference of raw prefixes (equations 23, 24 with MATH's signs): it cancels
-    /// like 2^-53 (r T)^(k + 1).
+    /// Moments q[0 .. count-1] of the slab, front != back.  Inside one entry they are integrated.  Across
+    /// entries q[k >= 1] is the difference of raw prefixes (equations 23, 24, with the signs of
+    /// docs/math.md): it loses about 2^-53 (r T)^(k + 1).
     Moments moments(double front, double back, double length, int count) const;
 
-    /// The constant colour of the piece between entries i and i + 1 for X_k: (X_k[i+1] - X_k[i]) / (T[i+1]^k
-    /// - T[i]^k); the mean of the two colours where nothing absorbs.
+    /// The constant colour for X_k between entries i and i + 1: (X_k[i+1] - X_k[i]) / (T[i+1]^k - T[i]^k);
+    /// where nothing absorbs, the mean of both colours.
     Vec3 piece_color(int k, int i) const;
 
-    /// Over the fractions [u0, u1] of entry i, without any prefix: int tau, and int c (offset + T(u) -
+    /// Over the fractions [u0, u1] of entry i, without prefixes: int tau, and int c (offset + T(u) -
     /// T(u0))^exponent dT.
     double partial_depth(int i, double u0, double u1) const;
     Vec3 partial_moments(int i, double u0, double u1, int exponent, double offset) const;
@@ -77,7 +77,7 @@ struct PrefixTables {
     };
     Place place(double s) const;
 
-    /// Moments of the fractions u0 -> u1 of entry i at a signed rate: integrated, no prefix.
+    /// Moments of the fractions u0 -> u1 of entry i at a signed rate: integrated, without prefixes.
     Moments inside_one_entry(int i, double u0, double u1, double rate, int count) const;
 };
 
