@@ -488,10 +488,17 @@ void add_search(CLI::App& app, SearchArguments& a) {
     verb.add_flag_function(
         "--keep-integer-bits", [&](std::int64_t) { s.integer_bits = false; },
         "Search fraction bits only: ranges stay as the scene's preset has them");
-    verb.add_option("--views", s.views, "Views of a full turn to tune on; those between them are held out")
+    verb.add_option("--views", s.views,
+                    "Views of a full turn to tune on; as many others, 16 at least, are held out")
         ->check(CLI::Range(1, 1000))
         ->type_name("N")
         ->capture_default_str();
+    verb.add_option(
+            "--guarantee", a.guarantee,
+            "What the formats are held to: views, formats that a held-out view breaks are never written; "
+            "default: views")
+        ->check(CLI::IsMember({"views"}))
+        ->type_name("NAME");
     verb.add_option("--restarts", s.descent.restarts,
                     "Times that the search starts again from a random place below")
         ->check(CLI::Range(0, 10000))
@@ -512,7 +519,9 @@ void add_search(CLI::App& app, SearchArguments& a) {
     add_json_flag(verb, a.json);
     verb.add_flag("-q,--quiet", a.quiet, "No progress, no summary");
     verb.footer(
-        "The same scenes, settings and seed give the same formats, but where time is the cost.\n\n"
+        "The same scenes, settings and seed give the same formats, but where time is the cost.  Where no "
+        "formats "
+        "keep the bound it ends with 1 and writes none.\n\n"
         "Example:\n"
         "  squint search head.toml --size 128x128 --max-error 1 -o found\n"
         "  squint render head.toml --set precision.preset=$PWD/found/formats.toml && squint report found");

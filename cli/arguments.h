@@ -85,6 +85,7 @@ struct ReportArguments {
 };
 struct SearchArguments {
     search::Settings settings;
+    std::string guarantee = "views";
     bool json = false, quiet = false;
 };
 struct Text {  // help, version: printed, done

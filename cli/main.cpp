@@ -1,7 +1,7 @@
 // The squint program: parses the command line, runs one verb, turns what is thrown into one line and an exit
 // code.
 //
-//   0 done   1 a comparison failed   2 usage or input   70 internal error   130 interrupted
+//   0 done   1 a comparison failed, or nothing was found that keeps a bound   2 usage or input   70 internal error   130 interrupted
 #include "cli/arguments.h"
 #include "cli/common.h"
 #include "core/atomic_file.h"

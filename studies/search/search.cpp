@@ -21,17 +21,24 @@
 #include <set>
 
 namespace squint::search {
+
+double Result::may_break_percent() const {
+    return 100 * (1 - std::pow(0.05, 1 / static_cast<double>(other_degrees.size())));
+}
+
 namespace {
 
 using namespace squint::sweep;
 using Part = WireEdit::Part;
 
 constexpr int kPictureSize = 96;  // pixels a side of what is kept for the report
+constexpr int kLeastHeldOut = 16;
+constexpr int kMostSets = 12;  // of views held out, one after the other
 
 /// A direction that pictures are taken from: settings of one scene's camera.
 struct View {
     double degrees = 0;
-    bool tuned = true;
+    bool held_out = false;                            // nothing was decided by it
     std::vector<std::vector<std::string>> overrides;  // by scene
 };
 
@@ -72,6 +79,7 @@ class Searcher {
         const auto begun = std::chrono::steady_clock::now();
         read_scenes();
         make_run_folder(s_.folder);
+        for (const std::string& old : {formats_file(), search_file()}) std::filesystem::remove(old);
         RunLog log(s_.folder, {{"command", s_.command}, {"threads", threads_}, {"shard", "1/1"}});
         const auto write_log = [&](const char* state) {
             const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begun;
@@ -80,10 +88,15 @@ class Searcher {
         write_log("begun");
         try {
             make_views();
-            const Found found = descend();
-            finish(found);
+            Found found = descend();
+            if (found.feasible) hold(found);
+            result_.pictures = pictures_, result_.computed = computed_;
+            if (found.feasible)
+                finish(found);
+            else
+                write_trail();
         } catch (...) {
-            write_text_whole(s_.folder + "/sweep.json", dump(sweep_record(sweep_, entries_, wanted_)));
+            write_trail();
             write_log("interrupted");
             throw;
         }
@@ -92,6 +105,11 @@ class Searcher {
     }
 
   private:
+    std::string formats_file() const { return s_.folder + "/formats.toml"; }
+    std::string search_file() const { return s_.folder + "/search.json"; }
+    void write_trail() const {
+        write_text_whole(s_.folder + "/sweep.json", dump(sweep_record(sweep_, entries_, wanted_)));
+    }
     std::size_t scenes() const { return std::max<std::size_t>(sweep_.scenes.size(), 1); }
 
     // ------------------------------------------------------------------------------------ what is searched
@@ -197,16 +215,21 @@ class Searcher {
 
     // ------------------------------------------------------------------------------------ views
 
-    // Tuned on the turns 0, 1/n, 2/n ...; held out are those half-way between, or quarter turns about a
-    // single one.
+    // Tuned on the turns 0, 1/n, 2/n ...
     void make_views() {
-        const int n = s_.views, grid = n == 1 ? 4 : 2 * n;
-        for (int frame = 0; frame < grid; ++frame) {
-            View view{360.0 * frame / grid, frame % (grid / n) == 0, {}};
-            for (std::size_t i = 0; i < scenes(); ++i) view.overrides.push_back(turned(i, frame, grid));
-            (view.tuned ? result_.degrees : result_.other_degrees).push_back(view.degrees);
-            views_.push_back(std::move(view));
-        }
+        for (int k = 0; k < s_.views; ++k) add_view(k, s_.views, false);
+    }
+    // As many anew, evenly spaced, at turns that no other set has: the golden section of a gap further on each.
+    void hold_out() {
+        constexpr int kGap = 1000;
+        const int n = std::max(kLeastHeldOut, s_.views), first = (309 + 618 * result_.sets++) % kGap;
+        for (View& view : views_) view.held_out = false;
+        for (int i = 0; i < n; ++i) add_view(kGap * i + first, kGap * n, true);
+    }
+    void add_view(int frame, int grid, bool held_out) {
+        View view{360.0 * frame / grid, held_out, {}};
+        for (std::size_t i = 0; i < scenes(); ++i) view.overrides.push_back(turned(i, frame, grid));
+        views_.push_back(std::move(view));
     }
 
     std::vector<std::string> turned(std::size_t scene, int frame, int grid) {
@@ -226,12 +249,12 @@ class Searcher {
 
     // ------------------------------------------------------------------------------------ pictures
 
-    std::vector<Picture> pictures_of(const Point& formats, const std::string& phase, int restart, bool tuned,
-                                     const std::pair<std::string, std::string>& varied) {
+    std::vector<Picture> pictures_of(const Point& formats, const std::string& phase, int restart,
+                                     bool held_out, const std::pair<std::string, std::string>& varied) {
         std::vector<Picture> all;
         for (std::size_t scene = 0; scene < scenes(); ++scene)
             for (const View& view : views_) {
-                if (view.tuned != tuned) continue;
+                if (view.held_out != held_out) continue;
                 Picture picture;
                 Point& point = picture.entry.point = formats;
                 point.scene = picture.scene = scene;
@@ -245,7 +268,7 @@ class Searcher {
                 const auto text = [](std::string_view value) { return toml_text(value); };
                 point.values = {{"phase", text(phase)}, {"restart", toml_text(std::int64_t{restart})}};
                 if (scenes() > 1) point.values.emplace_back("scene", text(sweep_.scenes[scene]));
-                if (views_.size() > 1) point.values.emplace_back("degrees", toml_text(view.degrees));
+                point.values.emplace_back("degrees", toml_text(view.degrees));
                 if (!varied.first.empty()) point.values.push_back(varied), point.varied = varied.first;
                 all.push_back(std::move(picture));
             }
@@ -347,7 +370,7 @@ class Searcher {
             if (alone && steps[i].variable >= 0) varied = label_of(steps[i].variable, vectors[i]);
             const std::string phase(
                 kPhaseNames[static_cast<std::size_t>(alone ? Phase::alone : steps[i].phase)]);
-            std::vector<Picture> of = pictures_of(formats, phase, steps[i].restart, true, varied);
+            std::vector<Picture> of = pictures_of(formats, phase, steps[i].restart, false, varied);
             each = of.size();
             for (Picture& picture : of) pictures.push_back(std::move(picture));
         }
@@ -384,40 +407,75 @@ class Searcher {
                                 result_.trials, pictures_, t.error, s_.most_error, t.bits));
     }
 
-    Found descend() {
+    // Of all variables: those of `wide`, or the scene's own.
+    Lengths most_of(bool wide) const {
+        Lengths most;
+        for (std::size_t w = 0; w < base_.size(); ++w)
+            most.push_back(wide ? most_fraction_[w] : base_[w].format.fraction_bits);
+        if (s_.integer_bits)
+            for (const Spec& spec : base_) most.push_back(spec.format.integer_bits);
+        return most;
+    }
+    Problem problem_up_to(Lengths most) {
         Problem problem;
+        problem.most = std::move(most);
         problem.most_error = s_.most_error;
         problem.shaken = base_.size();  // fraction bits: a range too small is no place to begin
         problem.evaluate = [this](std::span<const Lengths> vectors, std::span<const Step> steps) {
             return evaluate(vectors, steps);
         };
-        const auto most_of = [&](bool wide) {
-            Lengths most;
-            for (std::size_t w = 0; w < base_.size(); ++w)
-                most.push_back(wide ? most_fraction_[w] : base_[w].format.fraction_bits);
-            if (s_.integer_bits)
-                for (const Spec& spec : base_) most.push_back(spec.format.integer_bits);
-            return most;
-        };
+        return problem;
+    }
+    std::string not_enough(double error, const std::string& where) const {
+        const bool largest = s_.figure == Figure::largest;
+        return fmt::format(
+            "--max-error: found {:g}, but with every wire at its widest the {} error is {:.4g} LSB8{}; "
+            "allowed: more than that{}",
+            s_.most_error, largest ? "greatest" : "rms", error, where,
+            largest ? ", or --figure rms where single pixels decide" : "");
+    }
+
+    Found descend() {
         // The scene's own formats are the top where they leave room below the bound: wider ones are slower to
         // render, and no wire of the result would want them.
         const Lengths own = most_of(false);
         const Step top{Phase::top, 0, -1};
         const bool roomy = evaluate({&own, 1}, {&top, 1})[0].error <= s_.most_error / 2;
-        problem.most = most_of(!roomy);
-        Found found = find_lengths(problem, s_.descent);
-        if (std::isinf(found.top.error)) {  // no word holds that many
-            problem.most = own;
-            found = find_lengths(problem, s_.descent);
-        }
+        Found found = find_lengths(problem_up_to(most_of(!roomy)), s_.descent);
+        if (std::isinf(found.top.error))  // no word holds that many
+            found = find_lengths(problem_up_to(own), s_.descent);
         if (!top_.failure.empty()) throw InputError(top_.failure);
-        if (!found.feasible)
-            throw InputError(fmt::format(
-                "--max-error: found {:g}, but with every wire at its widest the {} error is {:.4g} LSB8; "
-                "allowed: more than that{}",
-                s_.most_error, s_.figure == Figure::largest ? "greatest" : "rms", found.top.error,
-                s_.figure == Figure::largest ? ", or --figure rms where single pixels decide" : ""));
+        if (!found.feasible) result_.failure = not_enough(found.top.error, "");
         return found;
+    }
+
+    // Until a set of views that decided nothing holds: those that broke the formats decide with the others.
+    void hold(Found& found) {
+        for (hold_out(); found.feasible && !holds_held_out(found.lengths); hold_out()) {
+            if (result_.sets == kMostSets) {
+                result_.failure = fmt::format(
+                    "--max-error: found {:g}, but every one of {} sets of {} views held out breaks it; "
+                    "allowed: a "
+                    "higher bound, or more --views to tune on",
+                    s_.most_error, kMostSets, std::max(kLeastHeldOut, s_.views));
+                found.feasible = false;
+                return;
+            }
+            for (View& view : views_) view.held_out = false;
+            Found raised = raise_lengths(problem_up_to(most_of(true)), found.lengths);
+            if (std::isinf(raised.top.error))  // no word holds that many
+                raised = raise_lengths(problem_up_to(most_of(false)), found.lengths);
+            if (!raised.feasible)
+                result_.failure = not_enough(raised.top.error, " on a view that was held out");
+            found.feasible = raised.feasible, found.lengths = raised.lengths;
+        }
+    }
+    bool holds_held_out(const Lengths& lengths) {
+        Point formats;
+        formats.edits = edits_of(lengths);
+        std::vector<Picture> pictures = pictures_of(formats, "held out", 0, true, {});
+        const std::vector<Json> records = records_of(pictures);
+        return summary_of(pictures, records).trial.error <= s_.most_error;
     }
 
     // ------------------------------------------------------------------------------------ the result
@@ -425,13 +483,13 @@ class Searcher {
     Candidate judged(const std::string& name, const Point& formats, const std::string& axis,
                      std::vector<Spec> specs) {
         Candidate c{name, std::move(specs), 0, 0, 0, 0, 0, {}};
-        for (const bool tuned : {true, false}) {
+        for (const bool held_out : {false, true}) {
             std::vector<Picture> pictures =
-                pictures_of(formats, axis + (tuned ? "" : ", other views"), 0, tuned, {});
+                pictures_of(formats, axis + (held_out ? ", other views" : ""), 0, held_out, {});
             const std::vector<Json> records = records_of(pictures);
             const Summary sum = summary_of(pictures, records);
-            (tuned ? c.error : c.other_error) = sum.trial.error;
-            if (tuned) c.bits = sum.bits, c.table_bytes = sum.table_bytes, c.ms = sum.ms;
+            (held_out ? c.other_error : c.error) = sum.trial.error;
+            if (!held_out) c.bits = sum.bits, c.table_bytes = sum.table_bytes, c.ms = sum.ms;
             if (!sum.failure.empty()) c.failure = sum.failure;
         }
         return c;
@@ -445,6 +503,8 @@ class Searcher {
             specs.push_back(spec_of(found.lengths, w));
             result_.alone.push_back(spec_of(found.alone, w));
         }
+        for (const View& view : views_)
+            (view.held_out ? result_.other_degrees : result_.degrees).push_back(view.degrees);
         result_.found = judged("found", formats, "found", specs);
         result_.scene = judged("as the scene says", {}, "as the scene says", base_);
         Point squeeze;
@@ -457,23 +517,26 @@ class Searcher {
         result_.pictures = pictures_, result_.computed = computed_;
         if (other_program_ > 0 && s_.note)
             s_.note(fmt::format("{} pictures were computed by another build of squint", other_program_));
-        result_.formats_file = s_.folder + "/formats.toml";
+        result_.formats_file = formats_file();
         write_text_whole(result_.formats_file, formats_text());
         result_.json = json_of_result();
         Json sweep = sweep_record(sweep_, entries_, wanted_);
         sweep["search"] = result_.json;
         write_text_whole(s_.folder + "/sweep.json", dump(sweep));
-        write_text_whole(s_.folder + "/search.json", dump(result_.json));
+        write_text_whole(search_file(), dump(result_.json));
         check_file(formats.edits);
     }
 
     std::string formats_text() const {
         std::string text = fmt::format(
-            "# Found by squint search: {} error of at most {:g} LSB8{} with the fewest {}.\n"
+            "# Found by squint search: {} error of at most {:g} LSB8{} with the fewest {}, on {} views of a "
+            "turn\n"
+            "# that it was chosen by and on {} that were held out.  Views, not a proof.\n"
             "#   squint render SCENE --set precision.preset=THIS_FILE\n"
             "[precision]\npreset = \"{}\"\n",
             s_.figure == Figure::largest ? "a greatest" : "an rms", s_.most_error,
-            s_.srgb ? " on an sRGB display" : "", kCostNames[static_cast<std::size_t>(s_.cost)], preset_);
+            s_.srgb ? " on an sRGB display" : "", kCostNames[static_cast<std::size_t>(s_.cost)],
+            result_.degrees.size(), result_.other_degrees.size(), preset_);
         for (std::size_t w = 0; w < result_.wires.size(); ++w)
             text +=
                 fmt::format("{} = \"{}\"\n", info(result_.wires[w]).name, to_string(result_.found.specs[w]));
@@ -523,6 +586,9 @@ class Searcher {
                      {"seed", s_.descent.seed},
                      {"degrees", result_.degrees},
                      {"other_degrees", result_.other_degrees},
+                     {"guarantee", "views"},
+                     {"sets_held_out", result_.sets},
+                     {"may_break_percent", result_.may_break_percent()},
                      {"trials", result_.trials},
                      {"pictures", pictures_},
                      {"descents", result_.costs},

@@ -30,8 +30,8 @@ struct Settings {
     bool srgb = false;         // colours as a display shows them
     std::vector<Wire> wires;   // empty: all that the scenes use
     bool integer_bits = true;  // search them too; otherwise they stay as the scenes have them
-    int views = 2;             // of a full turn of each scene's camera
-    int repeats = 5;           // of a timed picture
+    int views = 2;    // of a full turn of each scene's camera to tune on; as many, and 16 at least, held out
+    int repeats = 5;  // of a timed picture
     Options descent{.restarts = 4, .seed = 1};
     std::string folder;   // RUN
     std::string command;  // for the record
@@ -41,7 +41,7 @@ struct Settings {
     std::function<void(const std::string&)> note;      // what a user should know
 };
 
-/// Formats, and how they do on the views that were tuned on and on those between.
+/// Formats, and how they do on the views that decided and on those held out.
 struct Candidate {
     std::string name;
     std::vector<Spec> specs;            // of Result::wires
@@ -54,17 +54,25 @@ struct Candidate {
 struct Result {
     std::vector<Wire> wires;
     Candidate found, scene, squeeze;
-    std::vector<Spec> alone;  // what each wire needs while all the others have the most
-    std::vector<double> degrees, other_degrees;
-    std::vector<double> costs;  // what every descent ended with
+    std::vector<Spec> alone;            // what each wire needs while all the others have the most
+    std::vector<double> degrees;        // views that decided: tuned on, or held out until formats broke one
+    std::vector<double> other_degrees;  // views that decided nothing: `found` holds on all of them
+    int sets = 0;                       // of views held out: all but the last broke what was found
+    std::vector<double> costs;          // what every descent ended with
     std::size_t trials = 0, pictures = 0,
                 computed = 0;  // vectors of formats; pictures of them; not there before
+    std::string failure;       // why no formats were found; then there is no file
     std::string formats_file;
     sweep::Json json;  // squint.search/1
+
+    /// Were views of this turn drawn at random, as many of them might break `found` although none of
+    /// other_degrees does: with 1 - p^n = 95 % another n would have shown it.
+    double may_break_percent() const;
 };
 
-/// Throws InputError where a scene cannot be used or no formats keep the bound, and Cancelled; the pictures
-/// tried before that stay, and the same search goes on with them.
+/// Formats that broke a view held out are raised, cheapest bit first, until they hold on it too, and tried on a
+/// set of views that decided nothing: what is written holds on the last set.  Throws InputError where a scene
+/// cannot be used, and Cancelled; the pictures tried before that stay, and the same search goes on with them.
 Result run_search(const Settings& settings);
 
 }  // namespace squint::search

@@ -38,6 +38,19 @@ class Descent {
         return found;
     }
 
+    Found back_off(const Lengths& from) {
+        Found found;
+        phase_ = Phase::back_off;
+        weights_.assign(problem_.most.size(), 1.0);
+        Lengths ceiling = problem_.most;
+        for (std::size_t v = 0; v < from.size(); ++v) ceiling[v] = std::max(ceiling[v], from[v]);
+        found.top = tried({ceiling}, phase_, {-1})[0];
+        found.lengths = passes(found.top) ? raised(from, ceiling) : ceiling;
+        found.trial = known_.at(found.lengths);
+        found.feasible = passes(found.trial);
+        return found;
+    }
+
   private:
     bool passes(const Trial& trial) const { return trial.error <= problem_.most_error; }
 
@@ -122,7 +135,7 @@ class Descent {
     Lengths raised(Lengths here, const Lengths& ceiling) {
         const std::size_t n = here.size();
         std::vector<double> promise(n, INFINITY);
-        for (Trial now = tried({here}, Phase::raise, {-1})[0]; !passes(now);) {
+        for (Trial now = tried({here}, phase_, {-1})[0]; !passes(now);) {
             std::vector<char> fresh(n, 0);
             std::size_t best = n;
             for (;;) {
@@ -139,7 +152,7 @@ class Descent {
                 for (const std::size_t v : order)
                     if (!fresh[v] && vectors.size() < kTogether)
                         vectors.push_back(changed(here, v, 1)), of.push_back(static_cast<int>(v));
-                const std::vector<Trial> trials = tried(vectors, Phase::raise, of);
+                const std::vector<Trial> trials = tried(vectors, phase_, of);
                 for (std::size_t i = 0; i < of.size(); ++i) {
                     const auto v = static_cast<std::size_t>(of[i]);
                     promise[v] = worth(trials[i], now) * weights_[v], fresh[v] = 1;
@@ -199,6 +212,7 @@ class Descent {
     Random random_;
     Options options_;
     int restart_ = 0;
+    Phase phase_ = Phase::raise;  // of what goes up
     std::vector<double> weights_;
     std::map<Lengths, Trial> known_;
 };
@@ -210,6 +224,10 @@ std::uint64_t Random::next() {
     z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
     z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
     return z ^ (z >> 31);
+}
+
+Found raise_lengths(const Problem& problem, const Lengths& from) {
+    return Descent(problem, {}).back_off(from);
 }
 
 Found find_lengths(const Problem& problem, const Options& options) {

@@ -26,8 +26,8 @@ struct Trial {
 };
 
 /// Why a vector is tried.
-enum class Phase { top, alone, raise, lower };
-inline constexpr std::string_view kPhaseNames[] = {"top", "alone", "min+1", "max-1"};
+enum class Phase { top, alone, raise, lower, back_off };
+inline constexpr std::string_view kPhaseNames[] = {"top", "alone", "min+1", "max-1", "back off"};
 
 struct Step {
     Phase phase{};
@@ -65,6 +65,10 @@ struct Found {
 /// bits weighted at random; what beats the best replaces it.  The same trials and the same result whenever
 /// evaluate() gives the same.
 Found find_lengths(const Problem& problem, const Options& options);
+
+/// From lengths that break the bound up by 2. until it holds, without 3. and 4.: where more is asked than when they
+/// were found.  `alone` and `costs` stay empty.
+Found raise_lengths(const Problem& problem, const Lengths& from);
 
 /// splitmix64 (Steele, Lea and Flood 2014): the same numbers on every machine.
 struct Random {

@@ -42,9 +42,9 @@ TEST_F(SearchProgram, WritesFormatsThatRenderToThePictureItJudged) {
 TEST_F(SearchProgram, SaysWhatItFoundAndIsAReport) {
     const Outcome found = squint("search s.toml --max-error 2 -o run" + kQuick);
     ASSERT_EQ(found.code, 0) << found.err;
-    for (const char* part :
-         {"found", "as the scene says", "Squeeze's table", "held out: 90, 180, 270 degrees",
-          "Squeeze's table in bits", "run/formats.toml: squint render s.toml"})
+    for (const char* part : {"found", "as the scene says", "Squeeze's table", "held out: 16 more",
+                             "guarantee: views; none of 16", "Squeeze's table in bits",
+                             "run/formats.toml: squint render s.toml"})
         EXPECT_NE(found.out.find(part), std::string::npos) << part << " in\n" << found.out;
     const Outcome report = squint("report run --format csv");
     EXPECT_EQ(report.code, 0) << report.err;
@@ -85,6 +85,20 @@ TEST_F(SearchProgram, SaysThatASceneSetsAWireItself) {
     EXPECT_NE(found.err.find("own.toml sets precision.color itself"), std::string::npos) << found.err;
 }
 
+TEST_F(SearchProgram, EndsWithOneAndNoFileWhereNoFormatsKeepTheBound) {
+    ASSERT_EQ(squint("search s.toml --max-error 4 -q -o run" + kQuick).code, 0);
+    ASSERT_TRUE(std::filesystem::exists(folder / "run/formats.toml"));
+    const Outcome found = squint("search s.toml --max-error 1e-9 -o run" + kQuick);
+    EXPECT_EQ(found.code, 1);
+    EXPECT_NE(found.err.find("--max-error: found 1e-09, but with every wire at its widest"),
+              std::string::npos)
+        << found.err;
+    EXPECT_EQ(found.out, "");
+    for (const char* file : {"run/formats.toml", "run/search.json"})
+        EXPECT_FALSE(std::filesystem::exists(folder / file)) << file << " of the search before";
+    EXPECT_TRUE(std::filesystem::exists(folder / "run/sweep.json")) << "the trail stays";
+}
+
 TEST_F(SearchProgram, RefusesWhatItCannotReadInOneLine) {
     expect_refusal(squint("search s.toml"), "--max-error");
     expect_refusal(squint("search s.toml --max-error 0"), "--max-error");
@@ -92,6 +106,7 @@ TEST_F(SearchProgram, RefusesWhatItCannotReadInOneLine) {
     expect_refusal(squint("search s.toml --max-error 1 --cost area"), "--cost");
     expect_refusal(squint("search s.toml --max-error 1 --wires colour"), "--wires: found \"colour\"");
     expect_refusal(squint("search s.toml --max-error 1 --views 0"), "--views");
+    expect_refusal(squint("search s.toml --max-error 1 --guarantee hope"), "--guarantee");
     expect_refusal(squint("search nothing.toml --max-error 1"), "nothing.toml");
     expect_refusal(squint("search s.toml --max-error 1 --set sampling.stepp=1"), "did you mean");
     write("r.toml", kScene + "[precision]\npreset = 'real'\n");
