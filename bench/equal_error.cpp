@@ -1,14 +1,13 @@
-// Speed at equal error, the figure that counts: how long each method, and VTK where it was built, takes to
-// come within 40 and 50 dB (foreground PSNR) of the reference.  Each is run at ever smaller steps, and the
-// cheapest one that was measured and comes that near counts: nothing is interpolated.  Progress on standard
-// error, JSON on standard output; bench/tables.py equal-error makes a table of it, bench/plots.py plots.
+// Speed at equal error: how long each method, and VTK where it was built, takes to come within 40 and 50 dB
+// (foreground PSNR) of the reference.  Each runs at ever smaller steps; the cheapest measured run that comes
+// near enough counts, without interpolation.  Progress on standard error, JSON on standard output;
+// bench/tables.py equal-error makes a table of it, bench/plots.py draws it.
 //
 //     bench_equal_error [scenes=phantom_128,cthead_translucent,head,figure_5,...] [lit=0] [threads=1]
-//     [size=800]
-//                       [every=8] [repeats=3] [coarsest=4] [finest=0.03125] [all=0]
+//                       [size=800] [every=8] [repeats=3] [coarsest=4] [finest=0.03125] [all=0]
 //
-// Scenes: phantom_SIZE, those of configs/bench by name, figure_N of configs/lee_shin, and `head`, the
-// built-in one.  all=1: every step down to the finest, past 50 dB, too.
+// Scenes: phantom_SIZE, those of configs/bench by name, figure_N of configs/lee_shin, and `head`, which is
+// built in.  all=1: every step down to the finest, also past 50 dB.
 #include "bench/support/support.h"
 #include "core/error.h"
 #ifdef SQUINT_HAS_VTK
@@ -59,7 +58,7 @@ struct Shot {
     double ms = 0, processor_ms = 0;
 };
 
-/// Renders again and again with what is kept kept: the median, ray cast alone.
+/// Renders repeatedly with its caches kept: the median time, of the ray cast alone.
 template <class R>
 Shot median_of(int repeats, R&& render_once) {
     std::vector<double> ms, processor;
@@ -92,7 +91,7 @@ Shot shoot(const Contender& contender, const Plan& plan, int threads, int repeat
     });
 }
 
-/// The least time of those that come within `psnr`; none where none does.
+/// The least time of those within `psnr`; empty if none is.
 std::optional<double> ms_at(const std::vector<Point>& points, double psnr, double Point::*time) {
     std::optional<double> least;
     for (const Point& point : points)
@@ -117,7 +116,7 @@ Json run(const std::string& name, bool lit, const Contender& contender, const Se
     const int every = static_cast<int>(settings.number("every"));
     std::vector<Point> points;
     Json list = Json::array();
-    // Past 50 dB there is nothing left to find; an error that grows again (VTK's) ends the search too.
+    // Stop past 50 dB, and where an error grows again (VTK's does).
     for (double step = settings.number("coarsest"); step >= settings.number("finest"); step /= 2) {
         std::vector<std::string> overrides = contender.overrides;
         overrides.push_back(fmt::format("sampling.step={}", step));

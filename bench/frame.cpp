@@ -1,12 +1,12 @@
-// Whole frames, 800x800: time beside error, every way there is to render them.
+// Whole frames of 800x800: time beside error, for every way to render them.
 //
 //     bench_frame --benchmark_filter='phantom_256/unlit' --benchmark_repetitions=5 --benchmark_out=frame.json
 //
-// The time is the ray cast alone.  Counters: `whole_ms` with plan and tables, `ns_per_sample` over all
-// samples of all rays (those in empty space too: compare with skipping off), `psnr` of the foreground against
-// the same picture in double, in dB (200: equal), and the machine's `load`.  Before anything is timed, lanes
-// and model must give the same bits.  `/float32` and `/default` are the same frame in float32 words and in
-// fixed-point ones.
+// The time is that of the ray cast alone.  Counters: `whole_ms` with plan and tables; `ns_per_sample` over
+// all samples of all rays (in empty space, too: compare with skipping off); `psnr` of the foreground against
+// the same picture in double, in dB (200: equal); and the machine's `load`.  Before timing, lanes and model
+// must give the same bits.  `/float32` and `/default` are the same frame in float32 and in fixed-point
+// words.
 #include "bench/support/support.h"
 #include "core/error.h"
 #include "pipeline/record.h"
@@ -41,7 +41,7 @@ const std::vector<Method>& methods() {
 
 enum class Picture { same, new_transfer_function };
 
-/// What is timed: a scene, a method and a way.
+/// What is timed: a scene, a method and a way to draw it.
 struct Frame {
     std::string scene;  // a file of configs/bench, or the size of a phantom
     bool lit = false;
@@ -75,7 +75,7 @@ RenderOptions with(int threads, const std::string& target = "", bool skip = true
     return options;
 }
 
-/// SIMD targets of this build that this machine has.
+/// The SIMD targets of this build that this machine has.
 const std::vector<std::string>& targets() {
     static const std::vector<std::string> found = [] {
         const Scene scene = phantom_scene(16, false, {"image.width=4", "image.height=4"});
@@ -92,7 +92,7 @@ const std::vector<std::string>& targets() {
 }
 
 double psnr_of(const Frame& frame, const Plan& plan, const Image& picture) {
-    static std::map<std::string, double> known;  // bits do not depend on the way
+    static std::map<std::string, double> known;  // bits do not depend on the way to draw
     const std::string key = fmt::format("{} {} {} {} {} {}", frame.scene, frame.lit, frame.step,
                                         frame.method.name, frame.size, frame.preset);
     constexpr int kEvery = 8;
@@ -130,7 +130,7 @@ void time_frame(benchmark::State& state, const Frame& frame) try {
     state.SkipWithError(error.what());
 }
 
-/// Lanes of every target and the model give the same picture.  Throws InputError.
+/// Checks that the lanes of every target and the model give the same picture.  Throws InputError.
 void check_bits() {
     for (const char* preset : {"default", "float32"})
         for (const char* method : {"pc", "pi2d", "pi1d", "pips"})
@@ -167,7 +167,7 @@ std::vector<Frame> frames_of(const std::string& scene) {
             frames.push_back(frame);
             frame.way = "no_skipping", frame.options = with(1, "", false);
             frames.push_back(frame);
-            // Fixed against float32 on the same layout: these two beside the two above.
+            // Fixed point against float32 on the same layout: these two beside the two above.
             frame.preset = "float32", frame.way = "float32_no_skipping";
             frames.push_back(frame);
             frame.way = "float32", frame.options = with(1);

@@ -3,10 +3,10 @@
 //
 //     bench_growth --benchmark_out=growth.json        (SQUINT_BENCH_LARGE=1 adds 1024^3: 2 GiB of voxels)
 //
-// The time is the ray cast alone, of frames behind the first.  Counters: `ns_per_sample` over all samples of
-// all rays, `ns_per_visited` over those that were not left out as empty, `peak_mib` of resident memory while
-// plan and first picture were made (the volume included), `setup_ms` of what is built once for a volume,
-// `load`. bench/growth.py prints tables and slopes and draws them.
+// The time is that of the ray cast alone, in frames after the first.  Counters: `ns_per_sample` over all
+// samples of all rays; `ns_per_visited` over those that were not skipped as empty; `peak_mib` of resident
+// memory while plan and first picture were made (with the volume); `setup_ms` of what is built once for a
+// volume; `load`. bench/growth.py prints tables and slopes, and draws them.
 #include "bench/support/support.h"
 #include "core/error.h"
 

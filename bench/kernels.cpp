@@ -1,10 +1,10 @@
-// Every kernel of the fast path alone, data in the first-level cache: time per 16 samples, each checked first
-// against the model's own lines.
+// Every kernel of the fast path alone, with data in the first-level cache: time per 16 samples.  Each is
+// first checked against the model's own lines.
 //
 //     bench_kernels --benchmark_filter='AVX2/default, cells/'
 //
-// Names are kernel/TARGET/case/kernel; the time is one call's, on a batch of 8 steps of 16 rays or on as many lit
-// samples as were drawn, and `per_16` that of 16 samples.
+// Names are kernel/TARGET/case/kernel.  The time is that of one call, on a batch of 8 steps of 16 rays or on
+// as many lit samples as were drawn; `per_16` is that of 16 samples.
 #include "tests/pipeline/machines/kernel_checker.h"
 
 #include <benchmark/benchmark.h>

@@ -1,4 +1,4 @@
-// Build times of the pre-integrated tables.
+// Times to build the pre-integrated tables.
 #include <benchmark/benchmark.h>
 #include <malloc.h>
 
@@ -17,7 +17,7 @@ namespace {
 
 using namespace squint;
 
-/// Four overlapping tents of opacity up to 0.9 per unit, as a user would draw.
+/// Four overlapping tents of opacity up to 0.9 per unit, as a user might draw.
 Entries drawn(int size) {
     Entries entries;
     for (int i = 0; i < size; ++i) {
@@ -38,8 +38,8 @@ void BuildPrefixTables(benchmark::State& state) {
 }
 BENCHMARK(BuildPrefixTables)->Args({256, 1})->Args({4096, 1})->Args({4096, 2})->Unit(benchmark::kMicrosecond);
 
-/// From control points to a method's quantised words in the preset `default`: what a change of the transfer
-/// function costs.  Range 0: entries; range 1: the method; range 2: its order.
+/// From control points to a method's quantised words in the preset `default`: the cost of a change of the
+/// transfer function.  Range 0: entries; range 1: the method; range 2: its order.
 void BuildWords(benchmark::State& state) {
     const int size = static_cast<int>(state.range(0));
     const auto method = static_cast<Method>(state.range(1));
@@ -74,7 +74,7 @@ void every_method_and_size(benchmark::internal::Benchmark* b) {
 }
 BENCHMARK(BuildWords)->Apply(every_method_and_size)->Unit(benchmark::kMicrosecond);
 
-/// From entries to 16-bit words in a buffer that is used again.
+/// From entries to 16-bit words in a buffer that is reused.
 void BuildPi2d(benchmark::State& state) {
     const int size = static_cast<int>(state.range(0));
     const Entries entries = drawn(size);
@@ -89,7 +89,7 @@ BENCHMARK(BuildPi2d)->Arg(256)->Arg(1024)->Arg(4096)->Unit(benchmark::kMilliseco
 
 }  // namespace
 
-// Memory that was used stays the program's: what is timed is building, not the system's pages.
+// The program keeps memory that it used, so that building is timed, not the system's pages.
 int main(int argc, char** argv) {
     mallopt(M_TRIM_THRESHOLD, 256 << 20), mallopt(M_MMAP_THRESHOLD, 256 << 20);
     benchmark::Initialize(&argc, argv);

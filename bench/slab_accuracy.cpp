@@ -1,6 +1,6 @@
-// The accuracy study of the classification methods: every method against the exact slab integral, colour and
-// alpha errors in LSB8 (1/255), in double, or with `--words PRESET` in a preset's words.  JSON on stdout;
-// `--markdown` prints the tables of docs/measurements/slab-accuracy.md instead.
+// The accuracy of classification methods: each against the exact slab integral, errors of colour and alpha in
+// LSB8 (1/255), in double, or with `--words PRESET` in a preset's words.  JSON on standard output;
+// `--markdown` prints the tables of docs/measurements/slab-accuracy.md.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -84,7 +84,7 @@ struct DrawnSlab {
     double front, back, length;
 };
 
-/// Ends on entries; lengths 1/4, 1/2, 1, 2 in turn.
+/// Ends on entries; lengths 1/4, 1/2, 1 and 2 in turn.
 std::vector<DrawnSlab> drawn(int size, double reach, int count) {
     std::mt19937 generator(2);
     std::uniform_real_distribution<double> uniform(0, 1);
@@ -107,7 +107,7 @@ SlabValue without_self_attenuation(const PrefixTables& tables, const DrawnSlab& 
     return value;
 }
 
-/// A method whose tables are made for one length: one set for each of the four.
+/// A method with tables for one length: a set for each of the four lengths.
 template <class Build>
 SlabFunction for_each_length(const Build& build) {
     using Tables = decltype(build(1.0));
@@ -145,8 +145,8 @@ std::vector<std::pair<std::string, SlabFunction>> methods(const Entries& entries
     return list;
 }
 
-/// The same in fixed point: tables and words of a preset, built for each of the four lengths.  What a method
-/// refuses is left out.
+/// The same in fixed point: a preset's tables and words, built for each of the four lengths.  Cases that a
+/// method refuses are left out.
 std::vector<std::pair<std::string, SlabFunction>> methods_in_words(const Entries& entries,
                                                                    const std::string& preset) {
     std::vector<std::pair<std::string, SlabFunction>> list;
@@ -219,7 +219,7 @@ std::string lsb8(double value) {
     return text;
 }
 
-/// One table per width and reach; rows come function by function, methods within.
+/// A table for each width and reach; a row for each function and method.
 void print_markdown(const std::vector<Row>& rows) {
     for (std::size_t begin = 0; begin < rows.size();) {
         std::size_t end = begin;

@@ -54,7 +54,7 @@ std::int64_t size_of(const std::string& text, const std::string& flag) {
     return value << shift;
 }
 
-/// `job`: the heading of the help that the verb stands under.
+/// `job`: the heading under which help lists the verb.
 CLI::App& add_verb(CLI::App& app, const char* job, const char* name, const char* help) {
     return *app.add_subcommand(name, help)->group(job);
 }
@@ -83,7 +83,7 @@ void add_size(CLI::App& verb, std::vector<std::string>& overrides) {
         ->type_name("WxH");
 }
 
-/// The value of an enumeration whose names stand in `names`, which CLI11 has checked.
+/// The value of an enumeration for one of its names, which CLI11 has checked.
 template <class E, std::size_t n>
 E named(const std::string_view (&names)[n], const std::string& name) {
     return static_cast<E>(std::find(names, names + n, name) - names);
@@ -269,7 +269,7 @@ void add_compare(CLI::App& app, CompareArguments& a) {
             ->type_name("FILE|-");
     verb.callback([&verb, &a, first, second, json] {
         if (json->count() > 0 && second->count() == 0 && !a.json.empty()) {
-            // What follows a bare --json is a picture.
+            // A word after a bare --json is a picture.
             const std::vector<CLI::Option*> order = verb.parse_order();
             const auto at = [&](const CLI::Option* option) {
                 return std::find(order.begin(), order.end(), option);
@@ -545,7 +545,7 @@ void add_help(CLI::App& app, HelpArguments& a) {
         "  source <(squint help --form bash)");
 }
 
-/// The command as a shell would take it.
+/// The command as a shell would accept it.
 std::string command_text(int argc, char** argv) {
     std::string text = "squint";
     for (int i = 1; i < argc; ++i) {
@@ -571,7 +571,7 @@ std::vector<std::string> flags_of(const CLI::App& verb) {
     return names;
 }
 
-/// "unknown WHAT "NAME"; did you mean ...?", or the names there are.
+/// "unknown WHAT "NAME"; did you mean ...?", or the list of names.
 std::string unknown(const char* what, const std::string& name, const std::vector<std::string>& names) {
     const std::vector<std::string_view> candidates(names.begin(), names.end());
     const std::string_view near = nearest_name(name, candidates);
@@ -580,7 +580,7 @@ std::string unknown(const char* what, const std::string& name, const std::vector
         near.empty() ? "allowed: " + listed(candidates) : fmt::format("did you mean \"{}\"?", near));
 }
 
-/// CLI11's messages on one line, with where to look.  A slip of the keyboard is named before what it left out.
+/// CLI11's message on one line, with where help is.  Names a misspelt word before a missing one.
 std::string message_of(const CLI::App& verb, const CLI::ParseError& error) {
     std::string message = error.what();
     for (const std::string& word : verb.remaining())
@@ -640,7 +640,7 @@ ProgramText program_text(const CLI::App& app) {
     return program;
 }
 
-/// `all`: the help of the program.
+/// `all`: the program's help.
 std::string help_text(const CLI::App& app, const std::string& all, const HelpArguments& a) {
     if (a.list) {
         std::string names;
@@ -701,7 +701,7 @@ Arguments parse(int argc, char** argv) {
         "error, 130 interrupted.\n\n"
         "Example:\n  squint render -o out.exr --preview out.png");
 
-    const std::string all = app.help();  // after a verb is parsed, CLI11 would print its help
+    const std::string all = app.help();  // taken now: after parsing, CLI11 would print the verb's help
     if (argc < 2) return Text{all};
 
     const auto chosen = [&]() -> std::string {

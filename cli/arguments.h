@@ -1,4 +1,4 @@
-// What was asked for on the command line: one plain structure a verb.
+// What the command line asked for: one plain structure for each verb.
 #pragma once
 
 #include "pipeline/render.h"
@@ -13,7 +13,7 @@
 
 namespace squint::cli {
 
-/// A scene: a file or the built-in one, and settings in the order given.
+/// A scene, from a file or built in, and its settings in the order given.
 struct SceneArguments {
     std::string file;
     std::vector<std::string> overrides;
@@ -22,7 +22,7 @@ struct SceneArguments {
 struct RenderArguments {
     SceneArguments scene;
     std::string output, preview, json;  // json: a file, or - for standard output
-    std::string reference_output;       // the reference itself, as EXR
+    std::string reference_output;       // the reference picture, as EXR
     RenderOptions options;
     std::int64_t max_memory = 0;  // bytes; 0: no limit
     bool reference = false, error = false, quiet = false, scene_reference = false, print_scene = false;
@@ -32,14 +32,14 @@ struct PlanArguments {
     bool json = false, brief = false;
 };
 struct PixelArguments {
-    std::vector<std::string> words;  // [SCENE.toml] X Y, as given: taken apart below
+    std::vector<std::string> words;  // [SCENE.toml] X Y as given; split below
     SceneArguments scene;
     int column = 0, row = 0;
-    std::pair<int, int> samples{0, -1};  // first and last; last -1: all
+    std::pair<int, int> samples{0, -1};  // first and last; last -1: all samples
     bool json = false;
 };
 struct NumberArguments {
-    std::vector<std::string> words;  // empty: operations come from standard input
+    std::vector<std::string> words;  // empty: read operations from standard input
     bool json = false;
 };
 struct CompareArguments {
@@ -50,7 +50,7 @@ struct CompareArguments {
     std::optional<double> min_psnr;    // dB
 };
 struct InfoArguments {
-    std::string volume;  // a procedural name or a file
+    std::string volume;  // the name of a procedural volume, or a file
     std::vector<std::string> overrides;
     bool json = false;
 };
@@ -71,10 +71,10 @@ struct TableArguments {
     std::string output;
 };
 struct SweepArguments {
-    std::vector<std::string> files;  // the sweep, or with collect the folders to join
+    std::vector<std::string> files;  // the sweep, or the folders to join (collect)
     std::vector<std::string> overrides;
     std::string output = "run";
-    std::string command;  // as typed, for the record
+    std::string command;  // as typed, for records
     int shard = 1, shards = 1, threads = 0;
     bool collect = false, dry_run = false, redo = false, json_lines = false, quiet = false;
 };
@@ -88,7 +88,7 @@ struct SearchArguments {
     std::string guarantee = "views";
     bool json = false, quiet = false;
 };
-struct Text {  // help, version: printed, done
+struct Text {  // help or version: printed, and done
     std::string text;
 };
 
@@ -97,10 +97,10 @@ using Arguments =
                  InfoArguments, VolumeArguments, DoctorArguments, HardArguments, TableArguments,
                  SweepArguments, ReportArguments, SearchArguments, Text>;
 
-/// Throws InputError: what was found and where help is.
+/// Parses the command line.  Throws InputError: what was found, and where help is.
 Arguments parse(int argc, char** argv);
 
-// One a verb.  Each returns an exit code and throws InputError.
+// One function for each verb.  Each returns an exit code and throws InputError.
 int run(const RenderArguments& arguments);
 int run(const PlanArguments& arguments);
 int run(const PixelArguments& arguments);

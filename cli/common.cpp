@@ -48,7 +48,7 @@ Scene read(const SceneArguments& arguments) {
 }
 
 Scene scene_of_volume(const std::string& name_or_file, const std::vector<std::string>& overrides) {
-    Scene any = built_in_scene();  // a scene has more than a volume: what else it says does not count here
+    Scene any = built_in_scene();  // stands for any scene: only its volume counts
     any.volume = {};
     Scene scene = scene_with(any, overrides);
     if (name_or_file.empty()) return scene;
@@ -74,8 +74,8 @@ std::shared_ptr<const Volume> load_and_complete(Scene& scene, std::vector<std::s
 }
 
 namespace {
-/// The setting that a plan's message is about: the one it begins with, or, of a section, the first that it
-/// names.  Empty where none was given.
+/// The setting that a plan's message is about: the one it begins with, or, for a section, the first that it
+/// names.  Empty if none was given.
 std::string setting_meant(const Scene& scene, const std::string& key, const std::string& message) {
     if (scene.given_at.contains(key)) return key;
     std::string meant;
@@ -152,8 +152,7 @@ std::string table_text(const std::vector<std::vector<std::string>>& rows, std::s
 }
 
 StatusLine::StatusLine(bool wanted) : shown_(wanted), terminal_(isatty(STDERR_FILENO)) {
-    if (!terminal_)
-        last_ = std::chrono::steady_clock::now();  // what is done within ten seconds needs no line
+    if (!terminal_) last_ = std::chrono::steady_clock::now();  // work of less than ten seconds needs no line
 }
 
 void StatusLine::clear() const {

@@ -1,4 +1,4 @@
-// What several verbs need.
+// Shared by several verbs.
 #pragma once
 
 #include "cli/arguments.h"
@@ -18,52 +18,52 @@ namespace squint::cli {
 inline constexpr int kDone = 0, kComparisonFailed = 1, kUsage = 2, kSomeFailed = 3, kInternal = 70,
                      kInterrupted = 130;
 
-/// Writes to standard output.  Throws InputError when it cannot be written.
+/// Writes to standard output.  Throws InputError where that fails.
 void print(std::string_view text);
 void print_json(const nlohmann::ordered_json& json);
-/// To a file, whole or not at all, or - for standard output.
+/// Writes to a file, whole or not at all, or to standard output for -.
 void write_json(const std::string& path, const nlohmann::ordered_json& json);
 
-/// The scene asked for, its preset file merged in.  A volume where a scene is expected, or one set in place of the
-/// built-in head, makes a scene of its own; its transfer function may still be missing: load() brings it.
+/// The requested scene with its preset file merged in.  A volume in place of a scene, or in place of the
+/// built-in head, makes a scene of its own; its transfer function may be missing until load().
 Scene read(const SceneArguments& arguments);
 
 /// A scene whose volume is NAME (procedural) or a file, with `volume.*` overrides.
 Scene scene_of_volume(const std::string& name_or_file, const std::vector<std::string>& overrides);
 
-/// The scene's volume, refused beyond `max_bytes` (0: no limit), as load(); a scene without a transfer function gets
-/// the data's own.
+/// Loads the scene's volume, and refuses one beyond `max_bytes` (0: no limit).  A scene without a transfer
+/// function gets the data's own.
 std::shared_ptr<const Volume> load_and_complete(Scene& scene, std::vector<std::string>& notes,
                                                 std::int64_t max_bytes = 0);
 
-/// The scene's volume, refused beyond `max_bytes` (0: no limit).  `notes` gets what a user should know.
+/// Loads the scene's volume, at most `max_bytes` (0: no limit).  `notes` receives what a user should know.
 std::shared_ptr<const Volume> load(const Scene& scene, std::vector<std::string>& notes,
                                    std::int64_t max_bytes = 0);
 
-/// make_plan(), whose messages begin with the place where the setting was given that they are about.
+/// make_plan(); its messages begin with the place of the setting that they are about.
 Plan plan_of(const Scene& scene, std::shared_ptr<const Volume> volume, int frame = 0);
 
-/// Scene, volume and plan in one step; the volume's notes stand before the plan's own.
+/// Scene, volume and plan in one step; the volume's notes come before the plan's.
 Plan plan_of(const SceneArguments& arguments);
 
 /// "12.3 MiB", "4.1 M".
 std::string text_of_bytes(std::int64_t bytes);
 std::string text_of_count(std::int64_t count);
 
-/// Rows of cells -> lines with aligned columns, two spaces apart.  The first row is the head; numbers go to
-/// the right.
+/// Rows of cells as lines with aligned columns, two spaces apart.  The first row is the head.  Numbers align
+/// right.
 std::string table_text(const std::vector<std::vector<std::string>>& rows, std::string_view indent = "");
 
-/// One line on a terminal's standard error, rewritten a few times a second; elsewhere (a log) a line every ten
-/// seconds.
+/// A status line: on a terminal's standard error it is rewritten a few times a second; elsewhere (a log) a
+/// line appears every ten seconds.
 class StatusLine {
   public:
     explicit StatusLine(bool wanted);
     ~StatusLine() { clear(); }
     void clear() const;
-    /// `last`: shown however soon it comes.
+    /// `last`: shows it at once, however soon after the one before.
     void show(const std::string& text, bool last = false);
-    bool due() const;  // whether show() would show something now
+    bool due() const;  // whether show() would show now
     bool rewrites() const { return terminal_; }
 
   private:
@@ -74,9 +74,9 @@ class StatusLine {
 /// "3.2 s", "12 min 5 s", "3 h 20 min".
 std::string text_of_time(double seconds);
 
-/// True after Ctrl-C while a picture is being rendered (see main.cpp).
+/// Set by Ctrl-C while a picture is being rendered (see main.cpp).
 extern std::atomic<bool> interrupted;
-/// While it lives, Ctrl-C sets `interrupted`; otherwise it ends the program at once.
+/// During its life Ctrl-C sets `interrupted`; at other times it ends the program.
 struct Interruptible {
     Interruptible();
     ~Interruptible();

@@ -42,7 +42,7 @@ std::string figures_text(const Comparison& comparison, const Image& image) {
            "raw units.\n";
 }
 
-/// What fails, a line each.
+/// The bounds that fail, a line each.
 std::vector<std::string> failures(const CompareArguments& a, const Comparison& comparison) {
     std::vector<std::string> lines;
     for (std::size_t i = 0; i < comparison.all.size(); ++i) {
@@ -62,7 +62,7 @@ std::vector<std::string> failures(const CompareArguments& a, const Comparison& c
     return lines;
 }
 
-/// |A - B| as colours on black.
+/// |A - B| as colours over black.
 Image sizes_of(Image image) {
     Image sizes{image.width, image.height, {}};
     for (Channel& channel : image.channels)
@@ -85,7 +85,7 @@ void write_difference(const CompareArguments& a, const Image& x, const Image& y)
         throw InputError(fmt::format("--diff {}: the name must end in .exr or .png", a.diff));
 }
 
-/// `image` as its preview shows it, over the background that its file names.
+/// `image` as its preview shows it, over the background that the file states.
 Image as_preview(const Image& image, const Attributes& attributes) {
     double background[3] = {0, 0, 0};
     if (const auto given = attributes.find("squint.image.background"); given != attributes.end())
@@ -95,7 +95,7 @@ Image as_preview(const Image& image, const Attributes& attributes) {
     return preview_of(image, background);
 }
 
-/// Linear light beside codes for a display is shown as those are.
+/// Linear light is compared with display codes as those: as a display shows it.
 void show_alike(const CompareArguments& a, Image& x, const Attributes& of_x, Image& y,
                 const Attributes& of_y) {
     const auto is_light = [](const Image& image) {
@@ -126,7 +126,7 @@ int run(const CompareArguments& a) {
         failed = failures(a, comparison);
         if (!a.diff.empty()) write_difference(a, x, y);
     } catch (const InputError& error) {
-        if (!comparison.all.empty()) throw;  // the pictures are well: the difference cannot be written
+        if (!comparison.all.empty()) throw;  // the pictures are fine: only the difference cannot be written
         failed = {error.what()};
     }
     if (!a.json.empty())

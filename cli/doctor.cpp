@@ -1,4 +1,4 @@
-// squint doctor: what this installation is made of, and whether it renders the bits it should.
+// squint doctor: what this installation consists of, and whether it renders the right bits.
 #include "cli/common.h"
 #include "core/pictures/pictures.h"
 #include "pipeline/machines/lanes/kernels.h"
@@ -18,10 +18,10 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// The hash of the picture below.  It changes only when a picture's meaning does (docs/conventions.md).
+// The hash of the picture below.  It changes only when the meaning of a picture does (docs/conventions.md).
 constexpr const char* kSelfTestHash = "d5d997b12f72b1bf6e9e15d03f5390a2";
 
-/// A lit ball in a shell, 32x32 pixels of words, by one path.
+/// A lit ball in a shell, 32x32 pixels of words, drawn by one path.
 std::string self_test(Path path) {
     const Scene scene =
         scene_with(built_in_scene(), {"volume.procedural=sphere", "volume.dims=24", "image.width=32",

@@ -1,5 +1,5 @@
-// squint hard: scenes whose transfer functions are hard to classify, each with every method: the error of one
-// slab against the exact integral, or why a method is refused.
+// squint hard: scenes with transfer functions that are hard to classify, each with every method: the error of
+// one slab against the exact integral, or why the method is refused.
 #include "cli/common.h"
 #include "core/error.h"
 #include "truth/slab_check.h"
@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-/// The scenes of configs/hard as they were when the program was built: name, text.
+/// The scenes of configs/hard, built into the program: name, text.
 constexpr std::pair<const char*, const char*> kCases[] = {
 #include "hard_cases.inc"
 };
@@ -26,7 +26,7 @@ struct Case {
     Scene scene;
 };
 
-/// Scene files as given, and those of folders in order of name.
+/// The scene files given, and those in folders, sorted by name.
 std::vector<std::string> files_of(const std::vector<std::string>& names) {
     std::vector<std::string> scenes;
     for (const std::string& name : names) {
@@ -57,8 +57,8 @@ std::vector<Case> cases_of(const HardArguments& a) {
 
 struct Outcome {
     SlabCheck check;
-    std::string refused;             // why, or empty
-    std::vector<std::string> notes;  // what the builder decided
+    std::string refused;             // the reason, or empty
+    std::vector<std::string> notes;  // what the tables' builder decided
 };
 Outcome outcome_of(Scene scene, const NamedMethod& method, const std::shared_ptr<const Volume>& volume) {
     scene.classification.method = method.method, scene.classification.order = method.order;

@@ -1,4 +1,4 @@
-// squint info and squint volume: what a volume is, and writing it for other programs.
+// squint info and squint volume: say what a volume is; write it for other programs.
 #include "cli/common.h"
 #include "core/error.h"
 #include "core/volume_source.h"
@@ -14,9 +14,9 @@
 namespace squint::cli {
 namespace {
 
-/// Voxels in at most `most` equal ranges of scalars, from the least to the greatest.
+/// A histogram: at most `most` equal ranges of scalars, from the least to the greatest.
 struct Histogram {
-    std::uint32_t first = 0, width = 1;  // of a range, in scalars
+    std::uint32_t first = 0, width = 1;  // width of a range, in scalars
     std::vector<std::int64_t> count;
 };
 

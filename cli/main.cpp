@@ -1,5 +1,5 @@
-// The squint program: parses the command line, runs one verb, turns what is thrown into one line and an exit
-// code.
+// The squint program: parses the command line, runs one verb, and turns an exception into one line and an
+// exit code.
 //
 //   0 done   1 a comparison failed, or nothing was found that keeps a bound   2 usage or input   70 internal error   130 interrupted
 #include "cli/arguments.h"
@@ -25,7 +25,7 @@ namespace {
 std::atomic<int> interruptible{0};
 static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 
-// Another thread may be about to create its temporary: it does so long before the second look.
+// Another thread may be about to create its temporary: it has done so long before the second look.
 void remove_temporaries_twice() noexcept {
     remove_temporaries();
     const timespec pause{0, 20'000'000};
@@ -47,14 +47,14 @@ void on_interrupt(int) {
         leave_at_once();
 }
 
-// Ends as the signal asks, but leaves nothing behind.
+// Ends as the signal demands, after removing temporaries.
 void on_end(int signal) {
     remove_temporaries_twice();
     std::signal(signal, SIG_DFL);
     std::raise(signal);
 }
 
-// What whoever started us ignores (nohup, a job in the background) stays ignored.
+// A signal that our parent ignores (nohup, a background job) stays ignored.
 void handle(int signal, void (*handler)(int)) {
     if (std::signal(signal, handler) == SIG_IGN) std::signal(signal, SIG_IGN);
 }

@@ -15,7 +15,7 @@
 namespace squint::cli {
 namespace {
 
-/// A key of --set and the words it takes; none where it takes numbers or paths.
+/// A key for --set and its words; none where it takes numbers or paths.
 struct Key {
     std::string name, help;
     std::vector<std::string> words;
@@ -40,7 +40,7 @@ std::vector<Key> keys() {
 
 // ------------------------------------------------------------------------------------------------ man
 
-/// Text for roff: nothing in it is a request.
+/// Escapes text so that roff sees no request in it.
 std::string roff(std::string_view text) {
     std::string out;
     for (const char c : text) {

@@ -1,4 +1,4 @@
-// What the command line understands, as a table: for man pages and for shells that complete.
+// The command line as a table: for man pages and completions of shells.
 #pragma once
 
 #include <string>
@@ -8,9 +8,9 @@
 namespace squint::cli {
 
 struct FlagText {
-    std::vector<std::string> names;  // "-o", "--output"; of a word without a flag: its name
-    std::string value;               // "OUT.exr"; empty: takes none
-    bool optional = false;           // the value may be left out
+    std::vector<std::string> names;  // "-o", "--output"; for a word without a flag, its name
+    std::string value;               // "OUT.exr"; empty: takes no value
+    bool optional = false;           // the value may be omitted
     std::vector<std::string> choices;
     std::string help;
 };
@@ -24,11 +24,11 @@ struct ProgramText {
     std::vector<VerbText> verbs;
 };
 
-/// The forms that `manual()` has: "man", "scene" (both roff), "bash", "zsh", "fish".
+/// All forms of `manual()`: "man" and "scene" (roff), "bash", "zsh", "fish".
 inline constexpr std::string_view kManualForms[] = {"man", "scene", "bash", "zsh", "fish"};
 
-/// "man": the page of a verb, or of the program where `verb` is empty; "scene": the page squint-scene(5) of every key;
-/// else a shell's completion: verbs, flags, their words, and the keys, wires and presets of --set.
+/// "man": the page of a verb, or of the program where `verb` is empty.  "scene": squint-scene(5), all keys.
+/// Else a shell's completion: verbs, flags, their words; keys, wires and presets for --set.
 std::string manual(const ProgramText& program, std::string_view form, const std::string& verb);
 
 }  // namespace squint::cli

@@ -1,4 +1,4 @@
-// squint number: a calculator in formats, for people (arguments) and for programs (a line an operation).
+// squint number: a calculator in formats, for people (arguments) and for programs (one operation a line).
 #include "cli/common.h"
 #include "core/error.h"
 #include "core/text.h"
@@ -29,7 +29,7 @@ std::string flags_of(const Calculation& c) {
 Exact value_of(const Calculation& c) {
     return {c.raw, c.spec.format.fraction_bits};
 }
-// What lies beyond the guard bits of a decimal does not show in six digits of an error.
+// What lies beyond a decimal's guard bits does not show in six digits of an error.
 std::string error_text(const Calculation& c) {
     return !c.inexact && !c.overflow ? "0"
                                      : fmt::format("{:+.6g}", static_cast<double>(last_bits(c)) /
@@ -85,7 +85,7 @@ int run(const NumberArguments& a) {
     for (int number = 1; std::getline(std::cin, line); ++number) {
         if (const auto comment = line.find(" //"); comment != std::string::npos) line.resize(comment);
         if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
-        // A line of standard output for each: the others are worth their answers.
+        // A wrong line gets a line of output, too: the others still get their answers.
         if (const std::string wrong = calculate({line}, c); !wrong.empty()) {
             any_wrong = true;
             print(a.json ? nlohmann::ordered_json{{"error", printable(wrong)}}.dump() + "\n" : "error\n");

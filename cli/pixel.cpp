@@ -21,7 +21,7 @@ const Format& format_of(const Plan& plan, int wire) {
     return plan.specs.spec[static_cast<std::size_t>(wire)].format;
 }
 
-/// What arrived on a wire: its word, or without rounding the value itself.
+/// What arrived on a wire: its word, or without rounding its value.
 double value_of(const Plan& plan, const TraceEvent& event) {
     const Format& format = format_of(plan, event.wire);
     return plan.real ? event.exact / static_cast<double>(format.one()) : to_real(event.raw, format);
@@ -48,7 +48,7 @@ std::string events_text(const Plan& plan, const PixelArguments& a, const RayTrac
         if (!wanted(a, e.slab)) continue;
         const auto w = static_cast<std::size_t>(e.event.wire);
         const Format& format = format_of(plan, e.event.wire);
-        // The exact value in the same units as the value; the error in units of the wire's last bit.
+        // The exact value in the units of the value; the error in units of the wire's last bit.
         rows.push_back(
             {e.slab == last ? ""
              : e.slab < 0   ? "set-up"

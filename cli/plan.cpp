@@ -1,4 +1,4 @@
-// squint plan: what a scene exercises, and what was left out and why.
+// squint plan: what a scene exercises, what is left out, and why.
 #include "cli/common.h"
 #include "pipeline/machines/lanes/lane_renderer.h"
 #include "pipeline/record.h"
@@ -27,7 +27,7 @@ struct FindTables {
     }
 };
 
-/// Every table of the plan: as the plan reports them, or as its stages hold them.
+/// Every table of the plan, as the plan reports them, or else as its stages hold them.
 std::vector<TableReport> tables_of(const Plan& plan) {
     if (!plan.tables.empty()) return plan.tables;
     std::vector<TableReport> tables;
@@ -36,7 +36,7 @@ std::vector<TableReport> tables_of(const Plan& plan) {
     return tables;
 }
 
-/// Bits of the lanes that run a stage; none where the model does.
+/// The bits of the lanes that run a stage; none where the model runs it.
 std::optional<int> lane_bits(const Plan& plan, std::size_t stage) {
     if (lanes::what_needs_the_model(plan) || (plan.projection_mode && stage >= 2)) return {};
     const lanes::StageWays ways = lanes::ways_of(plan);
@@ -49,7 +49,7 @@ std::string in_words(const Plan& plan) {
     return plan.float32 ? "in float32" : "in double";
 }
 
-/// How it will be rendered, and why: as `squint render` reports it.
+/// How the scene will be rendered, and why: as `squint render` reports it.
 struct PathOf {
     std::string path, why;
 };
@@ -98,7 +98,7 @@ std::string tables_text(const Plan& plan) {
     return table_text(rows, "  ");
 }
 
-/// A line a stage: what it is made of.
+/// A line for each stage: what it consists of.
 std::string brief_text(const Plan& plan) {
     std::string text;
     for (const StageReport& stage : plan.stages) {

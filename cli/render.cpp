@@ -1,4 +1,4 @@
-// squint render: a scene becomes an EXR, a preview and a record.
+// squint render: turns a scene into an EXR, a preview and a record.
 #include "cli/common.h"
 #include "core/atomic_file.h"
 #include "core/error.h"
@@ -30,7 +30,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// A bar on a terminal's standard error while a picture is being made; elsewhere a line every ten seconds.
+/// A progress bar on a terminal's standard error; elsewhere a line every ten seconds.
 class ProgressBar {
   public:
     explicit ProgressBar(bool wanted) : line_(wanted) {}
@@ -51,7 +51,7 @@ class ProgressBar {
     std::mutex mutex_;
 };
 
-/// "out.exr" -> "out.0007.exr" in a turntable.
+/// "out.exr" -> "out.0007.exr" for a turntable.
 std::string frame_path(const std::string& path, int frame, int frames) {
     if (frames == 1 || path.empty() || path == "-") return path;
     std::filesystem::path numbered(path);
@@ -69,7 +69,7 @@ bool ends_in(const std::string& path, Extensions extensions) {
     return std::find(extensions.begin(), extensions.end(), extension) != extensions.end();
 }
 
-/// Refuses at once what would be refused after the work.
+/// Refuses at once what would fail after the work.
 void check_output(const std::string& path, const char* flag, Extensions extensions) {
     if (path.empty()) return;
     const std::filesystem::path file(path);
@@ -96,7 +96,7 @@ std::string share(std::int64_t part, std::int64_t of) {
     return fmt::format("{:.3g} %", 100 * static_cast<double>(part) / static_cast<double>(of));
 }
 
-/// Digits, from no bit to all: powers of ten of the values that need so many bits.
+/// A histogram of bits as digits: powers of ten of the number of values that need so many bits.
 std::string magnitudes(const WireStatistics& s, const Format& format) {
     std::string digits;
     for (int b = 0; b <= format.integer_bits + format.fraction_bits; ++b) {
@@ -145,7 +145,7 @@ std::string error_text(const Errors& errors) {
     return text;
 }
 
-/// What --error costs: a picture in double, and one a stage that rounds, in words as this one.
+/// The cost of --error: a picture in double, and one for each stage that rounds.
 std::string price_of_errors(const Plan& plan, const RenderStatistics& statistics) {
     std::ptrdiff_t stages = 0;
     if (!plan.real)
@@ -162,7 +162,7 @@ struct Job {
     std::string output, preview;  // EXR as asked for, or the default; PNG or JPEG
 };
 
-/// The exact integral, with the scene in its attributes but no formats: it has none.
+/// Writes the exact integral with the scene in its attributes, but no formats: it has none.
 void write_reference(const Job& job, const Plan& plan, const Image& reference, int frame) {
     Attributes attributes = exr_attributes(plan, frame);
     std::erase_if(attributes, [](const auto& item) { return item.first.starts_with("squint.wire."); });
@@ -171,7 +171,7 @@ void write_reference(const Job& job, const Plan& plan, const Image& reference, i
               attributes);
 }
 
-/// A picture without matter, for which the plan has no reason, says so.
+/// Says that a picture shows nothing, where the plan has found no reason.
 std::vector<std::string> warnings_of(const Plan& plan, const Rendering& rendering) {
     std::vector<std::string> warnings = plan.warnings;
     const std::vector<float>& alpha = rendering.image.find("A")->values;
@@ -254,7 +254,7 @@ Json render_frame(const Job& job, int frame) {
     return record;
 }
 
-/// The line that makes a film of a turntable's pictures.
+/// The command that makes a film of a turntable's pictures.
 std::string film_line(const Job& job) {
     const bool linear = job.preview.empty();
     std::filesystem::path frames(linear ? job.output : job.preview), film = frames;

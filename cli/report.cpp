@@ -1,4 +1,4 @@
-// squint report: what a sweep found, as a page, or as numbers for programs and papers.
+// squint report: shows what a sweep found, as a page, or as numbers for programs and papers.
 #include "studies/sweep/report.h"
 #include "cli/common.h"
 #include "core/atomic_file.h"

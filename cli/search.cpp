@@ -1,4 +1,4 @@
-// squint search: the cheapest formats under an error, as a preset file, with the way there as a run.
+// squint search: finds the cheapest formats within an error; writes a preset file and a run.
 #include "studies/search/search.h"
 #include "cli/common.h"
 #include "cli/shelf.h"

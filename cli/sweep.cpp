@@ -1,4 +1,4 @@
-// squint sweep: every point of a sweep file, into a folder that a killed run goes on with.
+// squint sweep: measures every point of a sweep file; a run that was killed is continued.
 #include "cli/common.h"
 #include "cli/shelf.h"
 #include "core/error.h"

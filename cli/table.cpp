@@ -1,5 +1,5 @@
-// squint table: the tables of a scene's method as words, to look at and to plot.  Two dimensions (pi2d) as
-// EXR with channels R G B A, row = front, column = back; one dimension as CSV, one row an entry.
+// squint table: the tables of a scene's method as words, to look at and plot.  Two dimensions (pi2d) become
+// EXR: channels R G B A, row = front, column = back; one dimension becomes CSV, a row an entry.
 #include "cli/common.h"
 #include "core/atomic_file.h"
 #include "core/error.h"
@@ -32,7 +32,7 @@ Image image_of(const CellTable& cells, const WireSpecs& specs) {
     return image;
 }
 
-/// Raw words of every table with a row an entry, side by side.
+/// The raw words of all tables with a row an entry, side by side.
 struct CollectColumns {
     int entries;
     std::string& head;

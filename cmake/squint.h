@@ -1,4 +1,4 @@
-// squint, in one header and without SIMD: a scene and its volume -> a plan -> a picture, and how two pictures differ.
+// squint in one header, without SIMD: a scene and volume -> a plan -> a picture; differences of pictures.
 //
 //     find_package(squint REQUIRED)
 //     target_link_libraries(mine PRIVATE squint::pipeline)

@@ -1,4 +1,4 @@
-// The library from outside: scene -> volume -> plan -> picture, and how wrong it is.
+// The library from outside: scene -> volume -> plan -> picture, and its rounding error.
 //
 //     find_package(squint REQUIRED)
 //     target_link_libraries(minimal PRIVATE squint::pipeline)

@@ -38,7 +38,7 @@ void fill_block(OverlappedTables::Level& level, int start, const PrefixTables& e
     }
 }
 
-/// int c (T - front)^k dT over [lo, hi] of a block, from differences of its prefixes about its start.
+/// int c (T - front)^k dT over [lo, hi] of a block, from differences of its prefix sums.
 Vec3 about(double front, const std::array<Vec3, kMostMoments>& difference, int k) {
     Vec3 sum(0, 0, 0);
     double binomial = 1;

@@ -1,5 +1,5 @@
-// PC, post-classification: the sample's own matter over the slab's length (Squeeze, section 3).  No
-// integration, no table but the entries themselves: alpha = 1 - exp(-tau(s) d), C = c(s) alpha.
+// PC, post-classification: the matter of one sample over the slab's length (Squeeze, section 3), with no
+// integration and no table but the entries: alpha = 1 - exp(-tau(s) d), C = c(s) alpha.
 #pragma once
 
 #include "pipeline/classification/tables/linear_entries.h"

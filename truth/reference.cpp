@@ -19,9 +19,9 @@ namespace squint {
 namespace reference {
 namespace {
 
-constexpr double kSpent = 1e-12;    // transparency below which nothing behind is seen
+constexpr double kSpent = 1e-12;    // below this transparency nothing behind is seen
 constexpr double kSpentDepth = 40;  // exp(-40) = 4e-18
-constexpr int kMostHalvings = 48;   // a jump of the light's direction is pinned down to a rounding
+constexpr int kMostHalvings = 48;   // pins a jump of the light's direction down to a rounding
 
 // Gauss-Legendre with 3 points and Kronrod's extension to 7, on [-1, 1].  Exact to degrees 5 and 11.
 constexpr std::array<double, 7> kNode{
@@ -36,7 +36,7 @@ constexpr std::array<double, 7> kKronrod{
     0.104656226026467265193823857192073};
 constexpr std::array<double, 7> kGauss{0, 5.0 / 9, 0, 8.0 / 9, 0, 5.0 / 9, 0};
 
-/// exp(-x), x >= 0.  Most pieces are thin: eight terms of the series are below a rounding up to 1/32.
+/// exp(-x), x >= 0.  Most pieces are thin: up to 1/32 eight terms of the series suffice.
 inline double attenuation(double x) {
     if (x > 0.03125) return portable::exp(-x);
     const double y = x * x;
@@ -46,7 +46,7 @@ inline double attenuation(double x) {
 
 /// A piece of a ray between two knots, q from 0 to 1.
 struct Piece {
-    Cubic rise;                     // of the coordinate above the stretch's first entry
+    Cubic rise;                     // the coordinate above the stretch's first entry
     std::array<double, 5> depth{};  // optical depth from the piece's front, a quartic
     double length = 0;              // world units
     const Stretch* stretch = nullptr;
@@ -73,7 +73,7 @@ Piece piece_of(const Cubic& coordinate, double from, double to, double length, c
     return piece;
 }
 
-/// The integral of f over [from, to], part of a piece whose depth sets how far the eye reaches: halves until
+/// Integrates f over [from, to], part of a piece whose depth limits how far one sees into it: halves until
 /// the two rules agree.
 template <class Value, class F, class Size>
 Value integrate(const Piece& piece, const F& f, const Size& size, double from, double to, double allowed,
@@ -97,7 +97,7 @@ double largest(const Vec3& v) {
     return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
 }
 
-/// Light of an unlit piece that reaches its front.  By parts, with T = exp(-depth):
+/// The light of an unlit piece that reaches its front.  By parts, with T = exp(-depth):
 ///     integral of c tau T = c(0) (1 - T(1)) + c' integral of s' (T - T(1)):  one integral for three colours.
 Vec3 emission(const Piece& piece, double clear, double allowed) {
     const Stretch& s = *piece.stretch;
@@ -110,7 +110,7 @@ Vec3 emission(const Piece& piece, double clear, double allowed) {
     return light + s.color_slope * integral;
 }
 
-/// The same where light falls: c tau T with c as the lights make it.
+/// The same where light falls: c tau T, with the colour c that the lights make.
 template <class Reflect>
 Vec3 lit_emission(const Piece& piece, const Reflect& reflect, double allowed) {
     return integrate<Vec3>(
@@ -123,8 +123,8 @@ Vec3 lit_emission(const Piece& piece, const Reflect& reflect, double allowed) {
         largest, 0, 1, allowed);
 }
 
-/// Where a polynomial that is monotone on [low, high] and passes `target` there does so: Halley's method,
-/// held between bounds that close in.  At a turning point its step is zero far from any root: the value
+/// Where a polynomial that is monotone on [low, high] passes `target`: Halley's method between
+/// bounds that close in.  At a turning point its step is zero far from any root, so the value
 /// decides.
 double crossing(const Cubic& p, double target, double low, double high, bool upwards) {
     double r = low;
@@ -138,13 +138,13 @@ double crossing(const Cubic& p, double target, double low, double high, bool upw
     return r;
 }
 
-/// Colour and transparency gathered along one ray.
+/// The colour and transparency gathered along one ray.
 class RayIntegral {
   public:
     RayIntegral(const Plan& plan, const Matter& matter, const RayLight* light, double allowed_per_length)
         : plan_(plan), matter_(matter), light_(light), allowed_per_length_(allowed_per_length) {}
 
-    /// Adds a cell; false where the ray ends in it.
+    /// Adds a cell; returns false where the ray ends in it.
     bool add(const Passage& passage, const Corners& corners);
     std::array<double, 4> pixel() const { return {color_.x, color_.y, color_.z, 1 - clear_}; }
 
@@ -161,7 +161,7 @@ class RayIntegral {
     double allowed_per_length_;
     Vec3 color_{0, 0, 0};
     double clear_ = 1;
-    // The cell at hand.
+    // The current cell.
     Cubic coordinate_;
     std::array<Cubic, 3> gradient_;
     double length_ = 0;
@@ -171,7 +171,7 @@ Reflection RayIntegral::reflection_at(double r) const {
     return (*light_)(Vec3(gradient_[0].at(r), gradient_[1].at(r), gradient_[2].at(r)));
 }
 
-/// An opaque surface: nothing behind it is seen.
+/// Adds an opaque surface: nothing behind it is seen.
 void RayIntegral::end_at(double r, double coordinate) {
     Vec3 color = matter_.color_at(coordinate);
     if (light_) {
@@ -185,7 +185,7 @@ void RayIntegral::end_at(double r, double coordinate) {
 void RayIntegral::add_piece(double from, double to, const Stretch& stretch) {
     if (stretch.clear || !(to > from)) return;
     const Piece piece = piece_of(coordinate_, from, to, length_, stretch);
-    // A rounding is the least that can be asked of a piece.
+    // A piece's tolerance is at least a rounding.
     const double allowed = std::max(allowed_per_length_ * piece.length / clear_, 1e-15);
     const double through = attenuation(std::max(piece.depth_at(1), 0.0));
     const Vec3 light =
@@ -196,7 +196,7 @@ void RayIntegral::add_piece(double from, double to, const Stretch& stretch) {
     clear_ *= through;
 }
 
-/// From knot to knot along a part of the cell where the field only rises or only falls.
+/// From knot to knot, over a part of the cell where the field only rises or only falls.
 bool RayIntegral::add_monotone(double from, double to) {
     const double first = coordinate_.at(from), last = coordinate_.at(to);
     const bool upwards = last > first;
@@ -253,7 +253,7 @@ bool RayIntegral::add_field(const Passage& passage, const Cubic& scalar) {
     return true;
 }
 
-/// Least, greatest or mean coordinate of the field along a ray.
+/// The least, greatest or mean coordinate of the field along a ray.
 double projected(const Plan& plan, CellWalk& walk, double chord) {
     const CompositingMode mode = plan.scene.compositing.mode;
     const double sign = mode == CompositingMode::minip ? -1 : 1;
@@ -281,7 +281,7 @@ double projected(const Plan& plan, CellWalk& walk, double chord) {
     return std::clamp(scalar / plan.entries.scalars_per_entry, 0.0, plan.entries.size() - 1.0);
 }
 
-/// A plan, ready to be integrated.
+/// A plan, prepared for integration.
 class Reference {
   public:
     Reference(const Plan& plan, double tolerance, bool many_rays);
@@ -296,7 +296,7 @@ class Reference {
     std::unique_ptr<Blocks> blocks_;
 };
 
-/// Of the volume's box and the scene's clip box together.
+/// The intersection of the volume's box and the scene's clip box.
 Vec3 Reference::corner(bool high) const {
     const Volume& v = *plan_.volume;
     const auto& clip = high ? plan_.scene.clip.high : plan_.scene.clip.low;
@@ -306,7 +306,7 @@ Vec3 Reference::corner(bool high) const {
     return corner;
 }
 
-// Of the tolerance, a quarter goes to knots left out, along the longest ray, and half to quadrature.
+// A quarter of the tolerance goes to knots left out, along the longest ray, and half to quadrature.
 Reference::Reference(const Plan& plan, double tolerance, bool many_rays)
     : plan_(plan),
       tolerance_(tolerance),

@@ -14,7 +14,7 @@ std::int64_t last_cell(std::int64_t voxels) {
     return std::max<std::int64_t>(voxels - 2, 0);
 }
 
-/// A voxel with its index held inside the volume.
+/// A voxel, its index clamped to the volume.
 double voxel(const Volume& v, std::int64_t x, std::int64_t y, std::int64_t z) {
     return v.at(std::clamp<std::int64_t>(x, 0, v.dims.x - 1), std::clamp<std::int64_t>(y, 0, v.dims.y - 1),
                 std::clamp<std::int64_t>(z, 0, v.dims.z - 1));
@@ -27,7 +27,7 @@ double central_difference(const Volume& v, const Index3& p, int axis) {
     const Index3 e = unit_along(axis);
     return voxel(v, p.x + e.x, p.y + e.y, p.z + e.z) - voxel(v, p.x - e.x, p.y - e.y, p.z - e.z);
 }
-/// (-1 0 1) along the axis, (1 2 1) across it twice.
+/// (-1 0 1) along the axis, (1 2 1) twice across it.
 double sobel_difference(const Volume& v, const Index3& p, int axis) {
     const Index3 e = unit_along((axis + 1) % 3), f = unit_along((axis + 2) % 3);
     double sum = 0;
@@ -110,7 +110,7 @@ Corners corners_of(const Volume& volume, const Index3& cell) {
 }
 
 std::array<Cubic, 3> gradient_along(const Volume& volume, GradientRule rule, const Passage& passage) {
-    // Differences are once, twice or 32 times the gradient.
+    // Differences are the gradient times 1, 2 or 32.
     const double differences = rule == GradientRule::analytic ? 1 : rule == GradientRule::sobel ? 32 : 2;
     std::array<Cubic, 3> gradient;
     for (int axis = 0; axis < 3; ++axis) {
@@ -120,7 +120,7 @@ std::array<Cubic, 3> gradient_along(const Volume& volume, GradientRule rule, con
             Index3 p = passage.cell + Index3(i & 1, i >> 1 & 1, i >> 2);
             double& here = difference[static_cast<std::size_t>(i)];
             if (rule == GradientRule::analytic) {
-                // The edge through this corner: the same at both its ends.
+                // The edge through this corner has one value at both its ends.
                 p[axis] = passage.cell[axis];
                 const Index3 ahead = p + unit_along(axis);
                 here = voxel(volume, ahead.x, ahead.y, ahead.z) - voxel(volume, p.x, p.y, p.z);
@@ -140,7 +140,7 @@ Blocks::Blocks(const Volume& volume, const std::function<bool(double, double)>& 
     for (int a = 0; a < 3; ++a) count_[a] = (last_cell(volume.dims[a]) >> kShift) + 1;
     visible_.resize(static_cast<std::size_t>(count_.x * count_.y * count_.z));
     const auto past = [&](std::int64_t block, int axis) {
-        return std::min((block + 1) * kSide + 1, volume.dims[axis]);  // cells share their far voxels
+        return std::min((block + 1) * kSide + 1, volume.dims[axis]);  // neighbouring cells share voxels
     };
     std::size_t at = 0;
     for (std::int64_t bz = 0; bz < count_.z; ++bz)
@@ -167,7 +167,7 @@ CellWalk::CellWalk(const Volume& volume, const Ray& ray, const Interval& inside,
         last_cell_[a] = last_cell(volume.dims[a]);
         if (volume.is_thin(a)) origin_[a] = rate_[a] = 0;  // the field is constant along it
         const double at = origin_[a] + rate_[a] * here_;
-        // On a plane between two cells the ray is in the one it goes into.
+        // On a plane between two cells the ray belongs to the cell that it enters.
         const double cell = rate_[a] < 0 ? std::ceil(at) - 1 : std::floor(at);
         cell_[a] = static_cast<std::int64_t>(std::clamp(cell, 0.0, static_cast<double>(last_cell_[a])));
         local_[a] = std::clamp(at - static_cast<double>(cell_[a]), 0.0, 1.0);
@@ -184,7 +184,7 @@ void CellWalk::aim(int axis) {
 
 void CellWalk::step_over(int axis) {
     const std::int64_t neighbour = cell_[axis] + (rate_[axis] > 0 ? 1 : -1);
-    if (neighbour < 0 || neighbour > last_cell_[axis]) {  // only the box's own face is behind
+    if (neighbour < 0 || neighbour > last_cell_[axis]) {  // only the box's own face is left
         crossing_[static_cast<std::size_t>(axis)] = kNever;
         return;
     }

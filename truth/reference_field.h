@@ -1,5 +1,5 @@
-// The trilinear field along a ray, for the reference: inside one cell it is a cubic polynomial of the
-// distance.  Plain doubles; shares nothing with the stages.
+// The trilinear field along a ray, for the reference: a cubic polynomial of the distance inside one cell.
+// Plain doubles; shares nothing with the stages.
 #pragma once
 
 #include "core/camera.h"
@@ -13,59 +13,59 @@
 
 namespace squint::reference {
 
-/// c[0] + c[1] r + c[2] r^2 + c[3] r^3.
+/// A polynomial c[0] + c[1] r + c[2] r^2 + c[3] r^3.
 struct Cubic {
     std::array<double, 4> c{};
     double at(double r) const { return c[0] + r * (c[1] + r * (c[2] + r * c[3])); }
     double slope(double r) const { return c[1] + r * (2 * c[2] + r * (3 * c[3])); }
-    /// The same polynomial in q, where r = from + width q.
+    /// The same polynomial in q, for r = from + width q.
     Cubic stretched(double from, double width) const;
 };
 
-/// Where the slope of p changes sign in (0, 1), ascending; at most two.
+/// Where the slope of p changes sign in (0, 1), in ascending order; at most two places.
 struct Turns {
     int count = 0;
     std::array<double, 2> at{};
 };
 Turns turns_of(const Cubic& p);
 
-/// The way of a ray through one cell, r from 0 to 1.
+/// The passage of a ray through one cell, with r from 0 to 1.
 struct Passage {
     Index3 cell{0, 0, 0};
     Vec3 from{0, 0, 0}, to{0, 0, 0};  // in the cell, each component in [0, 1]
     double first = 0, length = 0;     // world units along the ray
 };
 
-/// Values at a cell's corners, x fastest.
+/// The values at a cell's corners, x fastest.
 using Corners = std::array<double, 8>;
 
 /// The trilinear interpolant of `corners` along a passage.
 Cubic along(const Corners& corners, const Passage& passage);
 
-/// A part of a passage nearest to one voxel.
+/// The part of a passage where one voxel is nearest.
 struct NearestPart {
     Passage passage;
     double scalar = 0;
 };
-/// A passage cut where the nearest voxel changes: half-way between voxels, where the upper one begins.
+/// Cuts a passage where the nearest voxel changes: half-way between voxels, which belongs to the upper one.
 struct NearestParts {
     int count = 0;
     std::array<NearestPart, 4> part{};
 };
 NearestParts nearest_along(const Corners& corners, const Passage& passage);
 
-/// Scalars at the corners of a cell; an axis of one voxel repeats it.
+/// The scalars at the corners of a cell; an axis of one voxel repeats it.
 Corners corners_of(const Volume& volume, const Index3& cell);
 
 /// The gradient along a passage, in levels per smallest voxel spacing, in world space.  The rules of
-/// docs/conventions.md, all trilinear in the cell: differences of samples one voxel apart, clamped to the box, are
-/// the interpolated differences of the voxels.
+/// docs/conventions.md are all trilinear in the cell: differences of samples one voxel apart, clamped to the
+/// box, are interpolated differences of voxels.
 std::array<Cubic, 3> gradient_along(const Volume& volume, GradientRule rule, const Passage& passage);
 
-/// Blocks of 4 x 4 x 4 cells and whether a ray has to look into them.
+/// Blocks of 4 x 4 x 4 cells, and whether a ray must look into each.
 class Blocks {
   public:
-    /// `visible(least, greatest)` says whether scalars in that range matter.
+    /// `visible(least, greatest)` tells whether scalars of that range can be seen.
     Blocks(const Volume& volume, const std::function<bool(double, double)>& visible);
     static constexpr int kShift = 2;
     bool visible(const Index3& cell) const {
@@ -79,12 +79,12 @@ class Blocks {
     std::vector<std::uint8_t> visible_;
 };
 
-/// A ray's cells, front to back.
+/// The cells of a ray, front to back.
 class CellWalk {
   public:
-    /// `inside`: distances between which the ray is in the box.  Blocks may be null: then every cell is met.
+    /// `inside`: distances between which the ray is in the box.  Without blocks (null) all cells are visited.
     CellWalk(const Volume& volume, const Ray& ray, const Interval& inside, const Blocks* blocks);
-    /// The next cell; false behind the last.
+    /// Moves to the next cell; false after the last.
     bool next(Passage& passage);
 
   private:

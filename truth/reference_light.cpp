@@ -56,7 +56,7 @@ Reflection RayLight::operator()(const Vec3& gradient) const {
             const Lamp& lamp = lamp_[l];
             double facing = normal.dot(lamp.towards);
             double highlight = normal.dot(lamp.half);
-            if (s.model == ShadingModel::phong) {  // R.V, R the light mirrored about N; N or -N is the same
+            if (s.model == ShadingModel::phong) {  // R.V, R the light mirrored about N; the same for -N
                 highlight = 2 * facing * normal.dot(eye_) - lamp.towards.dot(eye_);
                 if (facing < 0 && !s.two_sided) highlight = 0;
             } else if (s.two_sided) {

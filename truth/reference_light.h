@@ -1,4 +1,4 @@
-// The light of docs/conventions.md in doubles, for the reference: straight from its equations.
+// The light of docs/conventions.md in doubles, for the reference: its equations, written directly.
 #pragma once
 
 #include "core/camera.h"
@@ -11,10 +11,10 @@
 
 namespace squint::reference {
 
-/// What a gradient makes of the light: matter of colour c shines with c * diffuse + specular.
+/// What light does at a gradient: matter of colour c shines with c * diffuse + specular.
 struct Reflection {
     Vec3 diffuse{1, 1, 1}, specular{0, 0, 0};
-    bool held_to_one = false;  // each channel of it
+    bool held_to_one = false;  // each channel is clamped to one
 
     Vec3 of(const Vec3& color) const {
         Vec3 light = color * diffuse + specular;
@@ -23,7 +23,7 @@ struct Reflection {
     }
 };
 
-/// x^p, or a cone in its place (a parabola in the angle), for x in [0, 1].
+/// x^p, or the cone that replaces it (a parabola in the angle), for x in [0, 1].
 class Power {
   public:
     explicit Power(const ShadingSettings& settings);
@@ -44,15 +44,15 @@ class Power {
 class RayLight {
   public:
     RayLight(const Scene& scene, const Volume& volume, const Camera& camera, const Vec3& ray_direction);
-    /// `gradient` in world space, in levels per smallest voxel spacing.  A zero gradient gets ambient light
-    /// only, and one below 2^-40 of the data's range is zero: a rounding has a direction, too.
+    /// `gradient` is in world space, in levels per smallest voxel spacing.  A zero gradient gets only ambient
+    /// light, and one below 2^-40 of the data's range counts as zero: a rounding error has a direction, too.
     Reflection operator()(const Vec3& gradient) const;
 
   private:
     struct Lamp {
         Vec3 towards, half, color;
     };
-    /// Shading.model gooch: between the warm and the cool side.
+    /// For shading.model gooch: the tone between the warm and the cool side.
     Reflection tone(double facing) const;
 
     const ShadingSettings* settings_;
@@ -61,7 +61,7 @@ class RayLight {
     Vec3 eye_;         // towards it
     std::array<Lamp, kMostLights> lamp_;
     std::size_t lamps_ = 0;
-    bool white_ = true;  // every lamp is
+    bool white_ = true;  // whether every lamp is
 };
 
 }  // namespace squint::reference

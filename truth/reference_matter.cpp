@@ -13,8 +13,8 @@ Values values_of(const Entry& e) {
     return {e.extinction, e.color.x, e.color.y, e.color.z};
 }
 
-/// The last entry to which a straight line from `first` passes all between within `allowed`: slopes that do
-/// so narrow from entry to entry.
+/// The last entry to which a straight line from `first` passes all entries between within `allowed`: the
+/// range of such slopes narrows from entry to entry.
 int straight_until(const std::vector<Entry>& entry, int first, const Values& allowed) {
     const Values from = values_of(entry[static_cast<std::size_t>(first)]);
     Values least, greatest;

@@ -16,7 +16,7 @@ int input_fraction(const Plan& plan) {
     return plan.specs[Wire::classification_input].format.fraction_bits;
 }
 
-/// Entries where the function bends, opaque ones among them, the sharpest first.
+/// Entries where the function bends, opaque ones among them, the sharpest bends first.
 std::vector<int> knots_of(const Entries& entries) {
     std::vector<std::pair<double, int>> bends;
     for (int i = 1; i + 1 < entries.size(); ++i) {

@@ -1,5 +1,5 @@
-// How well a plan's classification does on its own transfer function: words against the exact slab integral,
-// on the slabs that are hard for it.
+// Tests the classification of a plan on its own transfer function: words against the exact slab integral, on
+// hard slabs.
 #pragma once
 
 #include "pipeline/plan/plan.h"
@@ -16,17 +16,17 @@ struct HardSlab {
 
 struct SlabCheck {
     int slabs = 0;
-    int beyond = 0;            // slabs outside 0 <= C <= alpha <= 1
-    double largest_color = 0;  // error against the exact integral, premultiplied, in LSB8
+    int beyond = 0;            // slabs that violate 0 <= C <= alpha <= 1
+    double largest_color = 0;  // premultiplied, against the exact integral, in LSB8
     double largest_alpha = 0;
-    HardSlab worst{0, 0, 0};  // where the larger of both is
+    HardSlab worst{0, 0, 0};  // the slab with the larger of both errors
 };
 
-/// Both directions between the ends of the scalar range, the knots of the function and 1 and 9 entries beside
-/// them; equal ends; ends one last bit apart; full slabs and half ones.
+/// Slabs in both directions between the ends of the scalar range, the function's knots, and 1 and 9 entries
+/// beside them; with equal ends; with ends one last bit apart; whole and half ones.
 std::vector<HardSlab> hard_slabs(const Plan& plan);
 
-/// Classifies hard_slabs in the model's widest word.  Without the exact integral only the range is checked.
+/// Classifies hard_slabs() in the model's widest word.  Without `exact` it checks only the range.
 SlabCheck check_slabs(const Plan& plan, bool against_exact = true);
 
 /// Every method that a scene can name, as settings: pc, pi1d, pi1d_engel, pi2d, pi2d_no_attenuation, pips 1

@@ -38,7 +38,7 @@ Image empty_picture(int width, int height) {
     return image;
 }
 
-/// Calls visit(column, row) on every pixel of the lattice, from many threads.
+/// Calls visit(column, row) for every pixel of the lattice, on many threads.
 template <class V>
 void visit_lattice(int width, int height, int every, V&& visit) {
     tbb::parallel_for(0, (height - every / 2 + every - 1) / every, [&](int i) {
@@ -46,7 +46,7 @@ void visit_lattice(int width, int height, int every, V&& visit) {
     });
 }
 
-/// Everything of a scene that the reference looks at, and nothing that it does not.
+/// All of a scene that the reference depends on, and nothing else.
 std::string reference_key(const Plan& plan, int frame, int every) {
     Hasher hasher;
     hasher.text(plan.volume->content_hash);
@@ -93,7 +93,7 @@ Scene phantom_scene(std::int64_t size, bool lit, const std::vector<std::string>&
 }
 
 std::shared_ptr<const Volume> volume_of(const Scene& scene) {
-    // The last one only: some are large.
+    // Keep only the last one: some are large.
     static std::string loaded;
     static std::shared_ptr<const Volume> volume;
     std::string key;

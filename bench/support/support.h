@@ -1,4 +1,4 @@
-// What the benchmarks share: scenes, errors on a lattice of pixels, times and where they were taken.
+// Shared by benchmarks: scenes, errors on a lattice of pixels, times, and the machine.
 #pragma once
 
 #include "core/image.h"
@@ -17,25 +17,25 @@ namespace squint::bench {
 
 using Json = nlohmann::ordered_json;
 
-/// Names of configs/bench: "cthead_opaque", ...
+/// The names in configs/bench: "cthead_opaque", ...
 std::vector<std::string> data_scene_names();
-/// True where SQUINT_DATA names a folder.
+/// Whether SQUINT_DATA names a folder.
 bool has_data();
-/// One of configs/bench, with overrides `key=value` applied; lit as written, or without lights.
+/// A scene of configs/bench with `key=value` overrides; lit as written, or without lights.
 Scene data_scene(const std::string& name, bool lit, const std::vector<std::string>& overrides = {});
-/// A procedural phantom of size^3 with its own transfer function, 800x800, filling the picture; as dense at
-/// every size.
+/// A procedural phantom of size^3 with its own transfer function, 800x800, filling the picture; equally dense
+/// at every size.
 Scene phantom_scene(std::int64_t size, bool lit, const std::vector<std::string>& overrides = {});
 
-/// The scene's volume; loaded again only when another was asked for in between.
+/// The scene's volume; kept until another one is asked for.
 std::shared_ptr<const Volume> volume_of(const Scene& scene);
-/// The same voxels elsewhere: nothing kept for the volume is known of the copy.
+/// The same voxels in other memory: nothing cached for the volume applies to the copy.
 std::shared_ptr<const Volume> fresh_copy(const Volume& volume);
 
-/// Pixels (every * i + every / 2) of both directions, as a picture of their own: errors of large pictures
-/// from a part of them.
+/// Pixels (every * i + every / 2) in both directions, as a picture: gives errors of a large picture from a
+/// part of it.
 Image thinned(const Image& image, int every);
-/// The same part of the picture without any rounding (preset `real`), and of the reference.  The reference is
+/// The same part of the picture without rounding (preset `real`), and of the reference.  The reference is
 /// kept on disk, in SQUINT_BENCH_CACHE or the temporary folder, by all that decides it.
 Image thinned_real(const Plan& plan, int frame, int every);
 Image thinned_reference(const Plan& plan, int frame, int every);
@@ -43,7 +43,7 @@ Image thinned_reference(const Plan& plan, int frame, int every);
 /// Foreground PSNR of R, G and B together, in dB; 200 for identical pictures.
 double psnr(const Image& picture, const Image& other);
 
-/// Words `key=value` of a command line over defaults, each a list separated by commas.
+/// `key=value` words of a command line, over defaults; each value is a list separated by commas.
 class Settings {
   public:
     using Defaults = std::vector<std::pair<std::string, std::string>>;
@@ -57,7 +57,7 @@ class Settings {
     Defaults values_;
 };
 
-/// Wall time.
+/// Measures wall time.
 class Stopwatch {
   public:
     double ms() const {
@@ -68,21 +68,21 @@ class Stopwatch {
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-/// Milliseconds of processor this program has used, all threads together: what a busy machine does not
-/// stretch.
+/// Processor time of this program in milliseconds, all threads together: a busy machine does not stretch
+/// it.
 double processor_ms();
 
 double median(std::vector<double> values);
 
-/// Highest resident memory since the last reset, in bytes; 0 where the system does not tell.
+/// The highest resident memory since the last reset, in bytes; 0 where the system does not tell.
 void reset_peak_memory();
 std::int64_t peak_memory();
 
-/// Runnable processes over the last minute, and the machine: beside every figure.
+/// Runnable processes over the last minute, and the machine: printed beside every figure.
 double load();
 Json machine();
 
-/// One line on standard output, at once: a long run that is cut short keeps what it measured.
+/// Prints one line at once: a long run that is cut short keeps what it measured.
 void print_line(const Json& json);
 
 }  // namespace squint::bench

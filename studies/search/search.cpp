@@ -31,11 +31,11 @@ namespace {
 using namespace squint::sweep;
 using Part = WireEdit::Part;
 
-constexpr int kPictureSize = 96;  // pixels a side of what is kept for the report
+constexpr int kPictureSize = 96;  // pixels a side of pictures kept for reports
 constexpr int kLeastHeldOut = 16;
 constexpr int kMostSets = 12;  // of views held out, one after the other
 
-/// A direction that pictures are taken from: settings of one scene's camera.
+/// A view: camera settings for each scene.
 struct View {
     double degrees = 0;
     bool held_out = false;                            // nothing was decided by it
@@ -170,7 +170,7 @@ class Searcher {
         return sweep_.scenes.empty() ? "the built-in scene" : sweep_.scenes[i];
     }
 
-    // One format for all scenes: as many integer bits as the most hungry one asks for.
+    // One format serves all scenes: it has the integer bits of the scene that needs most.
     void add_variables(Wire wire, const std::vector<Plan>& plans) {
         Spec spec = plans[users_[wire][0]].specs[wire];
         int most = spec.format.fraction_bits;
@@ -196,7 +196,7 @@ class Searcher {
                    : wide_.emplace(scene, plan_of(scene, preset_alone("wide")).specs).first->second;
     }
 
-    // Variables: the fraction bits of every wire, then the integer bits of every wire.
+    // The variables: fraction bits of every wire, then integer bits of every wire.
     Spec spec_of(const Lengths& lengths, std::size_t w) const {
         Spec spec = base_[w];
         spec.format.fraction_bits = lengths[w];
@@ -275,7 +275,7 @@ class Searcher {
         return all;
     }
 
-    /// Records of pictures, in order; what is there already is read.
+    /// The records of pictures, in order.  Reads those that exist.
     std::vector<Json> records_of(std::vector<Picture>& pictures) {
         const bool timed = s_.cost == CostKind::time;
         const auto check = [&] {
@@ -294,7 +294,7 @@ class Searcher {
         std::vector<std::size_t> fresh;
         for (const auto& [hash, i] : first)
             if (!records_.contains(hash)) fresh.push_back(i);
-        for (const std::size_t i : fresh)  // by all threads, one after the other
+        for (const std::size_t i : fresh)  // one after the other, each on all threads
             if (pictures[i].prepared.failure.empty())
                 evaluator_.make_baselines(pictures[i].prepared, threads_);
         side_by_side(fresh.size(), timed ? 1 : threads_, [&](std::size_t n) {
@@ -346,12 +346,12 @@ class Searcher {
             table_bits += cost["table_bits"].get<double>() / n;
             if (record.contains("time")) sum.ms += record["time"]["ms"].get<double>() / n;
         }
-        // A greatest error beside the mean square: as if it were four times the root of that.
+        // A largest error counts with the mean square, as if it were four times its root.
         const double penalty = s_.figure == Figure::rms ? squares : squares + worst * worst / 16;
         sum.trial = {worst, penalty, sum.bits, sum.bits};
         if (s_.cost == CostKind::table_bytes)
             sum.trial.cost = sum.table_bytes, sum.trial.bits += 1e6 * table_bits;
-        // Times within a twentieth of each other are the same: what repeats differ by.
+        // Times within a twentieth count as equal: repeats differ by as much.
         if (s_.cost == CostKind::time) sum.trial.cost = std::floor(std::log(sum.ms) / std::log(1.05));
         return sum;
     }
@@ -365,7 +365,7 @@ class Searcher {
             Point formats;
             formats.edits = edits_of(vectors[i]);
             std::pair<std::string, std::string> varied;
-            // The report draws what each wire needs alone about the top.
+            // The report draws what each wire needs alone.
             const bool alone = steps[i].phase == Phase::alone || steps[i].phase == Phase::top;
             if (alone && steps[i].variable >= 0) varied = label_of(steps[i].variable, vectors[i]);
             const std::string phase(
@@ -420,7 +420,7 @@ class Searcher {
         Problem problem;
         problem.most = std::move(most);
         problem.most_error = s_.most_error;
-        problem.shaken = base_.size();  // fraction bits: a range too small is no place to begin
+        problem.shaken = base_.size();  // fraction bits: too small a range is no place to start
         problem.evaluate = [this](std::span<const Lengths> vectors, std::span<const Step> steps) {
             return evaluate(vectors, steps);
         };
@@ -436,8 +436,8 @@ class Searcher {
     }
 
     Found descend() {
-        // The scene's own formats are the top where they leave room below the bound: wider ones are slower to
-        // render, and no wire of the result would want them.
+        // The scene's own formats are the top where they leave room below the bound: wider ones render more
+        // slowly, and no wire of the result would need them.
         const Lengths own = most_of(false);
         const Step top{Phase::top, 0, -1};
         const bool roomy = evaluate({&own, 1}, {&top, 1})[0].error <= s_.most_error / 2;
@@ -543,7 +543,7 @@ class Searcher {
         return text;
     }
 
-    // A scene's own wires win over a preset file's.
+    // A scene's own wires override those of a preset file.
     void check_file(const std::vector<WireEdit>& edits) {
         for (std::size_t i = 0; i < scenes() && s_.note; ++i) {
             Point by_file, by_edits;
@@ -608,7 +608,7 @@ class Searcher {
     std::string preset_;
     std::vector<Spec> base_;                          // of result_.wires, one for all scenes
     std::vector<int> most_fraction_;                  // of result_.wires
-    std::map<Wire, std::vector<std::size_t>> users_;  // scenes that use a wire
+    std::map<Wire, std::vector<std::size_t>> users_;  // scenes that use each wire
     std::map<std::size_t, WireSpecs> wide_;
     std::vector<View> views_;
     std::vector<ListedPoint> entries_;

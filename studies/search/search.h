@@ -1,8 +1,8 @@
-// squint search: the cheapest formats of a scene's wires that keep its rounding error under a bound.
+// squint search: the cheapest formats of a scene's wires whose rounding error stays within a bound.
 //
-//   RUN/           a run of a sweep (studies/sweep/run.h) with every picture that was tried
-//   RUN/formats.toml   what was found: a preset file for precision.preset
-//   RUN/search.json    the figures (docs/sweeps.md, "squint search")
+// RUN/               a run of a sweep (studies/sweep/run.h) with every picture that was tried
+// RUN/formats.toml   the formats found, as a preset file for precision.preset
+// RUN/search.json    the figures (docs/sweeps.md, "squint search")
 #pragma once
 
 #include "studies/search/word_lengths.h"
@@ -18,18 +18,18 @@ namespace squint::search {
 
 enum class CostKind { bits, time, table_bytes };
 inline constexpr std::string_view kCostNames[] = {"bits", "time", "table-bytes"};
-enum class Figure { largest, rms };  // of the error over a picture
+enum class Figure { largest, rms };  // of a picture's error
 inline constexpr std::string_view kFigureNames[] = {"max", "rms"};
 
 struct Settings {
     std::vector<std::string> scenes;     // files; empty: the built-in scene
-    std::vector<std::string> overrides;  // of every scene
+    std::vector<std::string> overrides;  // for every scene
     double most_error = 0;               // LSB8, against the same pipeline in double
     CostKind cost = CostKind::bits;
     Figure figure = Figure::largest;
-    bool srgb = false;         // colours as a display shows them
+    bool srgb = false;         // compare colours as a display shows them
     std::vector<Wire> wires;   // empty: all that the scenes use
-    bool integer_bits = true;  // search them too; otherwise they stay as the scenes have them
+    bool integer_bits = true;  // search them too; false: they stay as the scenes have them
     int views = 2;    // of a full turn of each scene's camera to tune on; as many, and 16 at least, held out
     int repeats = 5;  // of a timed picture
     Options descent{.restarts = 4, .seed = 1};
@@ -38,15 +38,15 @@ struct Settings {
     int threads = 0;      // 0: one a processor
     const std::atomic<bool>* cancelled = nullptr;
     std::function<void(const std::string&)> progress;  // a line, now and then
-    std::function<void(const std::string&)> note;      // what a user should know
+    std::function<void(const std::string&)> note;      // for what a user should know
 };
 
 /// Formats, and how they do on the views that decided and on those held out.
 struct Candidate {
     std::string name;
     std::vector<Spec> specs;            // of Result::wires
-    double bits = 0, table_bytes = 0;   // means over the scenes
-    double ms = 0;                      // with CostKind::time: mean over all pictures
+    double bits = 0, table_bytes = 0;   // means over scenes
+    double ms = 0;                      // mean over pictures, with CostKind::time
     double error = 0, other_error = 0;  // LSB8; infinite where a picture failed
     std::string failure;
 };
@@ -60,7 +60,7 @@ struct Result {
     int sets = 0;                       // of views held out: all but the last broke what was found
     std::vector<double> costs;          // what every descent ended with
     std::size_t trials = 0, pictures = 0,
-                computed = 0;  // vectors of formats; pictures of them; not there before
+                computed = 0;  // vectors of formats; pictures that were computed now
     std::string failure;       // why no formats were found; then there is no file
     std::string formats_file;
     sweep::Json json;  // squint.search/1

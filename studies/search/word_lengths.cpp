@@ -9,7 +9,7 @@
 namespace squint::search {
 namespace {
 
-constexpr std::size_t kTogether = 4;  // trials asked for at a time; decides the trail, not who runs it
+constexpr std::size_t kTogether = 4;  // trials asked for at once; fixed, so that threads change nothing
 
 bool cheaper(const Trial& a, const Trial& b) {
     return std::pair(a.cost, a.bits) < std::pair(b.cost, b.bits);
@@ -54,7 +54,7 @@ class Descent {
   private:
     bool passes(const Trial& trial) const { return trial.error <= problem_.most_error; }
 
-    // Trials of vectors, each tried once.
+    // Tries vectors, each once.
     std::vector<Trial> tried(const std::vector<Lengths>& vectors, Phase phase,
                              const std::vector<int>& variables) {
         std::vector<Lengths> fresh;
@@ -72,7 +72,7 @@ class Descent {
         return out;
     }
 
-    // The least length of each variable that passes where all the others have the most.
+    // The least length of each variable that passes while all others have the most.
     Lengths each_alone() {
         const std::size_t n = problem_.most.size();
         Lengths fails(n, -1), enough = problem_.most;
@@ -99,8 +99,8 @@ class Descent {
         return lengths;
     }
 
-    // What is needed together is a bit or some more than what each needs alone: min+1 goes no higher than
-    // where as many bits to every variable are enough.
+    // Together the variables need a few bits more than each alone: min+1 stops where that many bits for every
+    // variable are enough.
     Lengths ceiling_over(const Lengths& alone) {
         for (int bits = 0;; ++bits) {
             Lengths ceiling = above(alone, bits);
@@ -108,7 +108,7 @@ class Descent {
         }
     }
 
-    // A bit or two from a third of the variables, at random; new weights for what follows.
+    // Takes a bit or two from a random third of the variables; draws new weights for what follows.
     Lengths shaken(Lengths lengths) {
         for (std::size_t v = 0; v < lengths.size(); ++v) {
             const int bits = random_.below(6) - 3;
@@ -123,15 +123,15 @@ class Descent {
         return lengths;
     }
 
-    /// How much a bit is worth: what it takes from the penalty, for each unit of cost.  Where no picture is
-    /// to be had without it, everything.
+    /// The worth of a bit: how much penalty it removes for each unit of cost; infinite where there is no
+    /// picture without it.
     static double worth(const Trial& with, const Trial& without) {
         if (std::isinf(without.penalty)) return std::isinf(with.penalty) ? 0 : INFINITY;
         return (without.penalty - with.penalty) / std::max(with.bits - without.bits, 1e-9);
     }
 
-    // Lazily: the worth of a bit hardly changes while other variables gain theirs, so that only the most
-    // promising are tried again where the search stands now (Minoux 1978).
+    // Lazily: the worth of a bit hardly changes while other variables grow, so only the most promising ones
+    // are tried again at the current vector (Minoux 1978).
     Lengths raised(Lengths here, const Lengths& ceiling) {
         const std::size_t n = here.size();
         std::vector<double> promise(n, INFINITY);
@@ -160,16 +160,16 @@ class Descent {
             }
             here = changed(here, best, 1);
             now = known_.at(here);
-            promise[best] /= 4;  // rounding's penalty goes down to a quarter with every bit
+            promise[best] /= 4;  // each bit divides the penalty of rounding by four
         }
         return here;
     }
 
-    // As lazily; a variable that cannot lose its bit now is asked again in the end.
+    // Lazily, too; a variable that cannot lose a bit now is asked again at the end.
     Lengths lowered(Lengths here) {
         const std::size_t n = here.size();
         std::vector<char> given_up(n, 0);
-        std::vector<double> price(n, -INFINITY);  // penalty for what a bit less saves
+        std::vector<double> price(n, -INFINITY);  // penalty for what a bit saves
         for (bool moved = false;;) {
             const Trial now = known_.at(here);
             std::vector<char> fresh(n, 0);

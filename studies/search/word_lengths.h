@@ -1,6 +1,6 @@
-// The cheapest word lengths that keep an error under a bound: min+1 from below, then max-1, then restarts
+// The cheapest word lengths whose error stays within a bound: min+1 from below, then max-1, then restarts
 // (Cantin, Savaria and Lavoie, "A comparison of automatic word length optimization procedures", ISCAS 2002).
-// Knows no scenes: what a vector of lengths costs and how wrong it is, it is told.
+// Knows nothing of scenes: the caller says what a vector of lengths costs and how large its error is.
 #pragma once
 
 #include <cstdint>
@@ -12,16 +12,16 @@
 
 namespace squint::search {
 
-/// Bits of every variable, in the order of Problem::most.
+/// The bits of every variable, in the order of Problem::most.
 using Lengths = std::vector<int>;
 
-/// What became of one vector.
+/// The outcome of one vector.
 struct Trial {
-    // Where there is no picture with these, all stay infinite.
-    double error = kNone;    // what is bounded
-    double penalty = kNone;  // by which one bit's worth is told from another's
-    double cost = kNone;     // what is made small
-    double bits = kNone;     // that counts where costs are equal
+    // All stay infinite where these lengths give no picture.
+    double error = kNone;    // has the bound
+    double penalty = kNone;  // compares the worth of bits
+    double cost = kNone;     // is minimised
+    double bits = kNone;     // decides between equal costs
     static constexpr double kNone = std::numeric_limits<double>::infinity();
 };
 
@@ -32,14 +32,14 @@ inline constexpr std::string_view kPhaseNames[] = {"top", "alone", "min+1", "max
 struct Step {
     Phase phase{};
     int restart = 0;    // 0: the first descent
-    int variable = -1;  // that differs from where the search stands; -1: none
+    int variable = -1;  // the variable changed from the current vector; -1: none
 };
 
 struct Problem {
-    Lengths most;            // of every variable; the least is 0
-    std::size_t shaken = 0;  // restarts take bits from so many of the first variables
+    Lengths most;            // of every variable; the least length is 0
+    std::size_t shaken = 0;  // restarts take bits from the first so many variables
     double most_error = 0;
-    /// Trials of some vectors, in order; may run them side by side.
+    /// Tries some vectors, in order; may run them in parallel.
     std::function<std::vector<Trial>(std::span<const Lengths>, std::span<const Step>)> evaluate;
 };
 
@@ -49,21 +49,21 @@ struct Options {
 };
 
 struct Found {
-    bool feasible = false;  // false: not even `most` keeps the error under the bound
+    bool feasible = false;  // false: even `most` breaks the bound
     Lengths lengths;
     Trial trial;
-    Trial top;                  // of `most`
-    Lengths alone;              // what each variable needs where all the others have the most
-    std::vector<double> costs;  // what each descent ended with: the first, then every restart
+    Trial top;                  // the trial of `most`
+    Lengths alone;              // what each variable needs while all others have the most
+    std::vector<double> costs;  // at the end of the first descent and of each restart
 };
 
-/// 1. `alone`: by bisection.  2. min+1: from there up, a bit at a time to the variable whose bit takes away
-/// the most penalty for its cost, until the bound holds.  3. max-1: down, a bit at a time from the variable
-/// whose bit adds the least penalty for what it saves, while the bound holds; in the end no variable can lose
-/// a bit.
-/// 4. Every restart takes bits from the best vector at random and goes on with 2 and 3, with the worth of
-/// bits weighted at random; what beats the best replaces it.  The same trials and the same result whenever
-/// evaluate() gives the same.
+/// 1. `alone`: by bisection.  2. min+1: from there upwards, one bit at a time, to the variable
+/// whose bit reduces the penalty most for its cost, until the bound holds.  3. max-1:
+/// downwards, one bit at a time, from the variable whose bit adds the least penalty for what it
+/// saves, while the bound holds; at the end no variable can lose a bit.  4. Each restart takes
+/// random bits from the best vector and repeats 2 and 3 with randomly weighted worths; a better
+/// vector replaces the best.  The same results of evaluate() give the same trials and the same
+/// result.
 Found find_lengths(const Problem& problem, const Options& options);
 
 /// From lengths that break the bound up by 2. until it holds, without 3. and 4.: where more is asked than when they

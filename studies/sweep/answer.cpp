@@ -42,7 +42,7 @@ std::string saving_text(double percent) {
     return fmt::format("{:.3g} % {} bits than", std::abs(percent), percent >= 0 ? "fewer" : "more");
 }
 
-/// The widest of wires -> specs; of those that `counts` takes.
+/// The widest wire of those that `counts` accepts.
 void find_widest(const Json& wires, Json& answer, const std::function<bool(const std::string&)>& counts) {
     int widest = 0;
     for (const auto& [wire, spec] : wires.items()) {
@@ -152,7 +152,7 @@ Json answer_of_sweep(const Json& data, double bound) {
             for (const Json& part : bits) sum += part.is_number() ? part.get<double>() : 0;
             if (sum > most) most = sum, answer["stage"] = stage, answer["stage_bits"] = sum;
         }
-    // Of wires that the sweep varies: others are as wide as somebody left them.
+    // Only wires that the sweep varies: others are as wide as somebody left them.
     find_widest(point["wires"], answer, [&](const std::string& wire) {
         return std::any_of(data["entries"].begin(), data["entries"].end(), [&](const Json& entry) {
             return entry.contains("varied") && entry["varied"].get<std::string>().starts_with(wire + " ");

@@ -19,7 +19,7 @@ int width(const Plan& plan, Wire wire) {
 constexpr std::array<std::string_view, kParts> kPartNames{
     "location", "interpolation", "input", "gradient", "normal", "classification", "shading", "compositing"};
 
-// Counts the last slab's operations part by part.
+// Counts the operations of the last slab, part by part.
 class BillOfParts : public Silent {
   public:
     std::array<Bill, kParts> bills;
@@ -35,7 +35,7 @@ class BillOfParts : public Silent {
     void at(Part part) { Tally::bill = &bills[static_cast<std::size_t>(part)]; }
 };
 
-// Tables at the widths of their wires, and as this program holds them.
+// Tables: at the widths of their wires, and as this program stores them.
 struct SumTables {
     Cost& cost;
     void operator()(const Rescale&) const {}
@@ -56,7 +56,7 @@ Cost cost_of(const Plan& plan) {
     Cost cost;
     BillOfParts counted(plan);
     any_slab<Tally>(plan, counted,
-                    2);  // of two neighbours the second: a sample between them is computed once
+                    2);  // the second of two neighbours: they share the sample between them
     for (std::size_t s = 0; s < plan.stages.size(); ++s) {
         if (!plan.stages[s].modelled) continue;
         StageCost stage{plan.stages[s].name, {}, 0, {}, {}, plan.stages[s].needs};
@@ -83,7 +83,7 @@ Cost cost_of(const Plan& plan) {
     const bool trilinear = plan.scene.sampling.interpolation == InterpolationRule::trilinear;
     cost.voxel_bytes = (trilinear ? 8 : 1) * scalar;
     if (plan.lit) {
-        // Voxels around a cell that each rule reads, the cell's own eight included.
+        // The voxels around a cell that each rule reads, with the cell's own eight.
         constexpr std::array<double, 4> kVoxels{32, 56, 8, 64};
         cost.lit_voxel_bytes = kVoxels[static_cast<std::size_t>(plan.gradient.rule)] * scalar;
     }

@@ -24,14 +24,14 @@
 namespace squint::sweep {
 namespace {
 
-constexpr std::size_t kMostRememberedBytes = std::size_t{1} << 28;  // of baseline pictures, in memory
+constexpr std::size_t kMostRememberedBytes = std::size_t{1} << 28;  // of baseline pictures kept in memory
 
 bool is_skipped(std::string_view key, const std::vector<std::string_view>& prefixes) {
     return std::any_of(prefixes.begin(), prefixes.end(),
                        [&](std::string_view prefix) { return key.starts_with(prefix); });
 }
 
-// Every setting but those of `without`, and what paths stand for instead of the paths.
+// All settings except `without`; paths are replaced by the hashes of what they name.
 void add_settings(Hasher& hasher, const Scene& scene, const Volume& volume,
                   std::vector<std::string_view> without) {
     without.insert(without.end(), {"volume.", "transfer_function.", "precision."});
@@ -68,7 +68,7 @@ Json errors_of(const Image& picture, const Image& other, const Measure& measure)
     return json;
 }
 
-// Premultiplied colour never exceeds opacity; rounding may say otherwise.
+// Colour exceeding opacity: a premultiplied colour never does, but rounding may let it.
 double color_above_alpha(const Image& image) {
     const auto& alpha = image.find("A")->values;
     double most = 0;
@@ -80,7 +80,7 @@ double color_above_alpha(const Image& image) {
     return most * 255;
 }
 
-// With every colour white and no light, C + T is one at every sample; what rounding leaves of that.
+// What rounding leaves of C + T = 1, which holds at every sample with white colours and no light.
 Json conservation(const Prepared& point, const RenderOptions& options) {
     Scene white = point.scene;
     const TransferFunction tf = resolve_transfer_function(white, *point.volume);
@@ -99,7 +99,7 @@ Json conservation(const Prepared& point, const RenderOptions& options) {
     return {{"least_lsb8", low * 255}, {"most_lsb8", high * 255}};
 }
 
-// Samples with an opacity above zero after which T stood where it was, on a grid of at most 32 x 32 rays.
+// Samples with opacity above zero that left T unchanged, on a grid of at most 32 x 32 rays.
 Json stuck_transparency(const Plan& plan) {
     constexpr int kRays = 32;
     const int across = std::max(1, plan.camera.width / kRays), down = std::max(1, plan.camera.height / kRays);
@@ -223,7 +223,7 @@ std::shared_ptr<const Volume> Evaluator::volume_of(const Scene& scene) {
     Loaded& loaded = found->second;
     if (is_new) try {
             loaded.volume = std::make_shared<const Volume>(load_volume(volume_source(scene)));
-            // Now, not while points run beside each other.
+            // Now, and not while points run in parallel.
             lanes::block_ranges(*loaded.volume, lanes::all_blocks_of(*loaded.volume));
         } catch (const InputError& error) {
             loaded.failure = error.what();
@@ -232,7 +232,7 @@ std::shared_ptr<const Volume> Evaluator::volume_of(const Scene& scene) {
     return loaded.volume;
 }
 
-// A preset's formats follow volume, transfer function and step: asked of a plan once for each.
+// A preset's formats depend on volume, transfer function and step: asks a plan once for each.
 WireSpecs Evaluator::preset_specs_of(const Scene& scene, const std::shared_ptr<const Volume>& volume) {
     Hasher hasher;
     add_settings(hasher, scene, *volume, {"image.", "output.", "classification.", "compositing."});
@@ -255,7 +255,7 @@ WireSpecs Evaluator::specs_of(const Scene& scene, const std::shared_ptr<const Vo
     WireSpecs specs;
     try {
         specs = preset_specs_of(scene, volume);
-    } catch (const InputError&) {  // the preset alone does not fit; with the scene's own wires it may
+    } catch (const InputError&) {  // only the preset does not fit; the scene's own wires may help
         return make_plan(scene, volume).specs;
     }
     for (int w = 0; w < kWires; ++w)

@@ -1,5 +1,5 @@
-// One point of a sweep: its settings -> its scene, its name, its figures.  Volumes, base scenes and the
-// pictures that points are compared with are made once and shared by all threads.
+// One point of a sweep: settings -> scene, name and figures.  Volumes, base scenes and the pictures that
+// points are compared with are made once and shared by all threads.
 #pragma once
 
 #include "core/image.h"
@@ -20,38 +20,38 @@ namespace squint::sweep {
 
 using Json = nlohmann::ordered_json;
 
-/// A point ready to be rendered, or why it cannot be.
+/// A point prepared for rendering, or the reason why it cannot be.
 struct Prepared {
     Scene scene;
     std::shared_ptr<const Volume> volume;
     std::string scene_file;             // empty: the built-in scene
-    std::vector<std::string> settings;  // key=value: what `squint render SCENE --set ...` needs
-    std::string hash;                   // of the resolved configuration and the data: names the point
+    std::vector<std::string> settings;  // key=value, as for `squint render SCENE --set ...`
+    std::string hash;                   // of the resolved configuration and the data: the point's name
     std::string failure;
 };
 
 class Evaluator {
   public:
-    /// `folder` keeps baselines and pictures; empty: nothing is kept on disk.
+    /// `folder` keeps baselines and pictures; empty: nothing goes to disk.
     Evaluator(const SweepFile& sweep, std::string folder, const std::atomic<bool>* cancelled = nullptr);
 
-    /// The wires that the sweep's scenes use at their base points, for expand().
+    /// The wires that the sweep's scenes use at their base points; for expand().
     std::vector<Wire> wires_in_use();
 
-    /// Never throws for what is wrong with the point: see Prepared::failure.  Safe from many threads.
+    /// Never throws for a fault of the point: see Prepared::failure.  Safe from many threads.
     Prepared prepare(const Point& point);
 
-    /// Makes the pictures that a point is compared with, where neither memory nor disk has them.
+    /// Makes the pictures that a point is compared with, unless memory or disk has them.
     void make_baselines(const Prepared& point, int threads);
 
-    /// Names of those pictures: what they depend on, hashed.
+    /// The names of those pictures: hashes of all that they depend on.
     std::vector<std::string> baseline_keys(const Prepared& point);
 
-    /// Renders, compares and counts: the record of a point (docs/sweeps.md, "The record of a point").
+    /// Renders, compares and counts; returns the record of a point (docs/sweeps.md, "The record of a point").
     /// `timed`: alone on the machine, with the sweep's repeats.  Throws InputError and Cancelled.
     Json measure(const Prepared& point, int threads, bool timed);
 
-    /// Names of everything that a record of this sweep holds; a record with more is as good.
+    /// The names of all that a record of this sweep holds; a record that holds more serves as well.
     std::vector<std::string> wanted() const;
 
   private:
@@ -87,18 +87,18 @@ class Evaluator {
     std::vector<std::string> images_by_age_;
 };
 
-/// "u1.12 rnd_conv sat" with one part changed.  Throws InputError where the bits are more than a format has.
+/// "u1.12 rnd_conv sat" with one part changed.  Throws InputError for more bits than a format can have.
 Spec edited(Spec spec, const WireEdit& edit);
 
-/// Version, and a hash of the running program: what a record was made by.
+/// What made a record: the version, and a hash of the running program.
 Json program_record();
 /// CPU, processors, SIMD target.
 Json machine_record();
 
-/// Every n-th pixel, so that no side is longer than `most`, as 16-bit linear words: what reports show.  One
-/// line "squint.values/1 WIDTH HEIGHT STRIDE", then deflated planes R G B A, low bytes before high bytes,
-/// each row as differences from its left neighbour.
-/// `level`: 1 is quick, 9 small.
+/// Every n-th pixel, so that no side is longer than `most`, as 16-bit linear words, for reports: one line
+/// "squint.values/1 WIDTH HEIGHT STRIDE", then the deflated planes R G B A, low bytes before high bytes,
+/// each row as differences from the left neighbour.  `level`: 1 compresses quickly, 9 to the smallest
+/// size.
 std::string values_file(const Image& image, int most, int level = 1);
 Image read_values(const std::string& bytes);  // R G B A
 

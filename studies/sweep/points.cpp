@@ -81,7 +81,7 @@ struct Random {
         z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
         return z ^ (z >> 31);
     }
-    std::size_t below(std::size_t n) {  // by rejection: no value is favoured
+    std::size_t below(std::size_t n) {  // by rejection, without bias
         const std::uint64_t limit = ~std::uint64_t{0} / n * n;
         std::uint64_t x;
         do x = next();
@@ -90,7 +90,7 @@ struct Random {
     }
 };
 
-// Distinct combinations, drawn evenly; all of them where there are no more.
+// Draws distinct combinations evenly; takes all where there are no more.
 std::vector<Point> drawn(const SweepFile& sweep, const Point& start, const std::vector<const Axis*>& axes,
                          Random& random) {
     double all = 1;

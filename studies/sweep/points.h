@@ -1,4 +1,4 @@
-// A sweep file -> the list of its points, in order.
+// Expands a sweep file to the list of its points, in order.
 #pragma once
 
 #include "studies/sweep/sweep_file.h"
@@ -11,17 +11,17 @@
 
 namespace squint::sweep {
 
-/// A point as asked for: which scene, which value on each axis.
+/// A point: its scene, and its value on each axis.
 struct Point {
     std::size_t scene = 0;                                    // index into SweepFile::scenes
     std::vector<std::string> overrides;                       // of the axes, in order
     std::vector<WireEdit> edits;                              // applied after all overrides
     std::vector<std::pair<std::string, std::string>> values;  // axis -> label, as TOML
-    std::string varied;  // mode one_at_a_time: the axis that leaves the base point; "" for the base
+    std::string varied;  // mode one_at_a_time: the axis that differs from the base; "" for the base
 };
 
-/// Every point, the scenes outermost, the last axis changing fastest.  `used` are the wires that [wires]
-/// means by "used".  Throws InputError beyond ten million points.
+/// All points: the scenes outermost, the last axis changing fastest.  `used` replaces "used" in [wires].
+/// Throws InputError beyond ten million points.
 std::vector<Point> expand(const SweepFile& sweep, const std::vector<Wire>& used);
 
 }  // namespace squint::sweep

@@ -31,13 +31,13 @@ std::string bytes_of(const std::string& path) {
     return bytes.str();
 }
 
-std::string quoted(const std::string& word) {  // for a shell
+std::string quoted(const std::string& word) {  // quotes for a shell
     std::string text = "'";
     for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
     return text + "'";
 }
 
-// The later of two settings of one key wins: the earlier need not be said.
+// Drops all but the last setting of each key.
 std::string command_of(const Json& record) {
     std::string text = "squint render";
     if (const std::string scene = record.value("scene", ""); !scene.empty()) text += " " + quoted(scene);
@@ -60,7 +60,7 @@ Json error_of(const Json& figures) {
     return json;
 }
 
-// Figures of a point's cost, as its record names them.
+// Costs of a point, by the names in its record.
 constexpr std::array kCostNames{"bits",
                                 "word_bits",
                                 "multiplier_bits",
@@ -90,7 +90,7 @@ Json point_of(const Json& record) {
     p["volume"] = record["volume"]["name"];
     const Json& cost = record["cost"];
     for (const char* name : kCostNames)
-        if (cost.contains(name)) p["cost"][name] = cost[name];  // points of /1 have fewer
+        if (cost.contains(name)) p["cost"][name] = cost[name];  // squint.point/1 has fewer
     for (const auto& [stage, figures] : cost["stages"].items())
         p["stages"][stage] = {figures["word_bits"], figures["multiplier_bits"]};
     p["wires"] = record["wires"];
@@ -112,7 +112,7 @@ Json point_of(const Json& record) {
     return p;
 }
 
-/// What a sweep can measure, and what it is where it was not: in a word, and in a line.
+/// What a sweep can measure, with a word and a line for where it was not measured.
 constexpr std::array<std::string_view, 3> kMeasurements[] = {
     {"time", "time", "Time: this sweep is not timed (measure.repeats)."},
     {"real", "rounding alone", "Rounding alone, against the same pipeline in double (measure.real)."},
@@ -138,7 +138,7 @@ void add_what_was_not_measured(Json& data, const Json& sweep, const Json& points
     if (failed > 0) lines.push_back(fmt::format("{} points failed: the table has their reasons.", failed));
 }
 
-// Points that nothing beats in both `cost` and error, as a set of indices.
+// The indices of points that no other beats in both `cost` and error.
 std::set<std::size_t> pareto_front(const Json& data) {
     std::vector<std::tuple<double, double, std::size_t>> all;
     for (std::size_t i = 0; i < data["points"].size(); ++i) {
@@ -188,14 +188,14 @@ class Pictures {
         if (!bytes.empty() && names_.insert(name).second) all_.push_back({name, std::move(bytes), in_full});
     }
     struct Packed {
-        Json index = Json::object();  // name -> width, height, stride, and where in the text it lies
+        Json index = Json::object();  // name -> width, height, stride, and its place in `text`
         std::string text;             // base64, one after the other
     };
     Packed packed() {
         std::int64_t full = 0, rest = 0;
         for (const Item& item : all_)
             (item.in_full ? full : rest) += static_cast<std::int64_t>(item.bytes.size()) * 4 / 3;
-        // The area to keep of each picture that is not kept in full.
+        // The area allowed to each picture that is not kept in full.
         const double left =
             std::max<double>(static_cast<double>(room_ - full), static_cast<double>(room_) / 4);
         const double keep = rest > 0 ? std::min(1.0, left / static_cast<double>(rest)) : 1;
@@ -401,7 +401,7 @@ std::string report_markdown(const Json& data) {
     text += "**" + data["answer"]["text"].get<std::string>() + "**\n\n";
     if (const std::string note = data["note"]; !note.empty()) text += note + "\n\n";
     std::vector<Column> columns = columns_of(data);
-    std::erase_if(columns, [](const Column& c) {  // a page is as wide as it is
+    std::erase_if(columns, [](const Column& c) {  // a page has a limited width
         return c.name == "command" || c.name == "picture hash" || c.name.ends_with("_bits") ||
                c.name.ends_with("_sample") || c.name.ends_with("bias") || c.name == "buffer_bytes" ||
                c.name == "samples";
@@ -451,7 +451,7 @@ std::string report_html(const Json& data, const std::string& run, std::int64_t m
                              true);
     }
     const Pictures::Packed packed = pictures.packed();
-    // What the audits counted is most of it, and is read when somebody looks at it.
+    // Most of it is audits' counts, which are read when somebody looks at them.
     Json whole = data, audits = Json::object();
     whole["pictures"] = packed.index;
     for (Json& point : whole["points"])

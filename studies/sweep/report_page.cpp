@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-// The assembler copies the file's bytes: a megabyte as an array would take the compiler a minute.
+// The assembler copies the file: as an array, a megabyte would take the compiler a minute.
 #ifdef SQUINT_REPORT_PAGE
 asm(".section .rodata\n"
     ".balign 16\n"

@@ -1,5 +1,5 @@
-// The page of a report, taken into the program when it was built; empty where tools/report/report.html was
-// not there.
+// The page of a report, built into the program; empty where tools/report/report.html was
+// missing.
 #pragma once
 
 #include <string_view>

@@ -44,7 +44,7 @@ std::vector<ListedPoint> list_points(const SweepFile& sweep, Evaluator& evaluato
 
 class Runner {
   public:
-    /// `dry`: nothing is written.
+    /// `dry`: writes nothing.
     Runner(const SweepFile& sweep, const RunOptions& options, bool dry)
         : sweep_(sweep),
           options_(options),
@@ -101,7 +101,7 @@ class Runner {
                 evaluator_.measure(p, timed ? threads_ : 1, timed);
                 f.seconds_a_point = seconds_since(start);
                 break;
-            } catch (const InputError&) {  // this one fails: try the next
+            } catch (const InputError&) {  // this point fails: try the next
             }
         }
         std::set<std::string> keys;
@@ -171,7 +171,7 @@ class Runner {
                 bool all = true;
                 for (const std::string& key : evaluator_.baseline_keys(p)) all &= !made.insert(key).second;
                 if (!all) evaluator_.make_baselines(p, threads_);
-            } catch (const InputError&) {  // said again, and recorded, when the point's turn comes
+            } catch (const InputError&) {  // reported and recorded when the point's turn comes
             }
             report({"baselines", n + 1, missing_.size(), 0, seconds_since(start)});
         }
@@ -245,7 +245,7 @@ Collected collect(const std::vector<std::string>& pieces, const std::string& fol
         if (read_json(joint)["points"] != sweep["points"])
             throw InputError(fmt::format("{}: belongs to another sweep than {}", piece, joint));
         for (const char* room :
-             {"pictures", "baselines", "runs", "points"})  // points last: they vouch for pictures
+             {"pictures", "baselines", "runs", "points"})  // points last: they vouch for the pictures
             for (const fs::directory_entry& file : fs::directory_iterator(piece + "/" + room, ignored)) {
                 const std::string name = file.path().filename().string();
                 const fs::path target = fs::path(folder) / room / name;

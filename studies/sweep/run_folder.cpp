@@ -124,7 +124,7 @@ Json settings_record(const std::vector<std::string>& settings) {
     for (const std::string& setting : settings) {
         const std::size_t equals = setting.find('=');
         const std::string key = setting.substr(0, equals), text = setting.substr(equals + 1);
-        record.erase(key);  // the last stands last
+        record.erase(key);  // the last one stays
         try {
             record[key] = json_of(parse_toml("v = " + text, "setting").items.at(0));
         } catch (const InputError&) {
@@ -147,7 +147,7 @@ RecordState state_of(const std::string& path, const std::vector<std::string>& wa
     Json record;
     try {
         record = read_json(path);
-        if (record.at("status") != "done") return RecordState::missing;  // the reason may be mended by now
+        if (record.at("status") != "done") return RecordState::missing;  // its cause may be mended by now
         const auto measured = record.at("measured").get<std::vector<std::string>>();
         for (const std::string& name : wanted)
             if (std::find(measured.begin(), measured.end(), name) == measured.end())

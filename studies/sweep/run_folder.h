@@ -1,4 +1,4 @@
-// The files of a run's folder (run.h draws it): records of points, the list of them, what worked there.
+// The files in the folder of a run (drawn in run.h): records of points, their list, what worked there.
 #pragma once
 
 #include "studies/sweep/evaluate.h"
@@ -9,38 +9,38 @@
 
 namespace squint::sweep {
 
-/// Makes it and its rooms.  Throws InputError where that is not possible.
+/// Creates it and its subfolders.  Throws InputError where that is impossible.
 void make_run_folder(const std::string& folder);
 
 std::string point_path(const std::string& folder, const std::string& hash);
 
-/// JSON as every file of a run holds it.
+/// JSON in the form that every file of a run has.
 std::string dump(const Json& json);
 
-/// "key=value" settings, as TOML, of which the last of a key wins -> {key: typed value}, in the order given; and back,
-/// from an object (squint.point/2) or a list of such settings (squint.point/1).
+/// "key=value" settings as TOML, where the last of a key wins -> {key: typed value}, in order; and back, from
+/// an object (squint.point/2) or from a list of settings (squint.point/1).
 Json settings_record(const std::vector<std::string>& settings);
 std::vector<std::string> settings_of(const Json& recorded);
 
-/// Whether a record is there, whole, and holds all that is wanted; a failed one is as good as none.
+/// Whether a record exists, is complete and holds all that is wanted; a failed one counts as missing.
 enum class RecordState { missing, reusable, other_program };
 RecordState state_of(const std::string& path, const std::vector<std::string>& wanted);
 
-/// Measures a point and writes its record into the evaluator's folder.  A point that fails has a record too,
-/// with the reason.  Throws Cancelled, and InputError where nothing can be written.
+/// Measures a point and writes its record into the evaluator's folder; a point that fails has a record with
+/// the reason.  Throws Cancelled, and InputError where nothing can be written.
 Json write_record(Evaluator& evaluator, const Prepared& point, const std::string& folder, int threads,
                   bool timed);
 
-/// One of a sweep's points: where it stands in the list and what names it.
+/// One point of a sweep: its place in the list, and its name.
 struct ListedPoint {
     Point point;
     std::string hash;
 };
-/// What sweep.json holds: the points in order, each by its hash, and what was asked for.
+/// The contents of sweep.json: the points in order, each by its hash, and the command.
 Json sweep_record(const SweepFile& sweep, const std::vector<ListedPoint>& entries,
                   const std::vector<std::string>& wanted);
 
-/// RUN/runs/*.json: a file for every time that the program worked in a folder, written anew as it goes on.
+/// RUN/runs/*.json: a file for each time that the program works in a folder, rewritten as it proceeds.
 class RunLog {
   public:
     struct Counts {

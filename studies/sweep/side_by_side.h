@@ -1,4 +1,4 @@
-// Pieces of work beside each other, each on one thread.
+// Runs pieces of work in parallel, each on one thread.
 #pragma once
 
 #include <tbb/task_arena.h>
@@ -17,8 +17,8 @@ inline int processors() {
     return static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
 }
 
-/// f(0) ... f(count - 1), each on one thread of `threads`; what f throws first stops the rest and is thrown
-/// here.
+/// Calls f(0) ... f(count - 1), each on one of `threads` threads.  The first exception stops the rest and is
+/// rethrown here.
 template <class F>
 void side_by_side(std::size_t count, int threads, F&& f) {
     std::atomic<std::size_t> next{0};
@@ -26,7 +26,7 @@ void side_by_side(std::size_t count, int threads, F&& f) {
     std::exception_ptr first;
     std::mutex mutex;
     const auto work = [&] {
-        tbb::task_arena alone(1);  // what a point does in parallel inside stays on its own thread
+        tbb::task_arena alone(1);  // parallel work inside a piece stays on its thread
         alone.execute([&] {
             for (std::size_t i; !stop && (i = next++) < count;) try {
                     f(i);

@@ -17,7 +17,7 @@ namespace squint::sweep {
 namespace {
 
 using Kind = TomlValue::Kind;
-constexpr std::size_t kMostValues = 100'000;  // of an axis
+constexpr std::size_t kMostValues = 100'000;  // on an axis
 
 class Reader {
   public:
@@ -96,7 +96,7 @@ class Reader {
             near.empty() ? "; docs/scene.md lists them" : fmt::format("; did you mean \"{}\"?", near)));
     }
 
-    // Tables, nested or with dotted keys -> key=value.
+    // Flattens tables, nested or with dotted keys, to key=value.
     void settings(const TomlValue& v, const std::string& prefix, std::vector<std::string>& out) const {
         if (v.kind != Kind::table) wrong(v, "a table of settings");
         for (const TomlValue& entry : v.items) {
@@ -108,7 +108,7 @@ class Reader {
         }
     }
 
-    // A list, or { from, to, step } or { from, to, factor }, both ends included.
+    // A list, or { from, to, step } or { from, to, factor } with both ends included.
     std::vector<TomlValue> values(const TomlValue& v) const {
         if (v.kind != Kind::table) return list(v);
         only(v, {"from", "to", "step", "factor"});
@@ -207,7 +207,7 @@ class Reader {
     void plain(const TomlValue& v, Axis& axis) const {
         const TomlValue& key = *v.find("key");
         axis.name = text(key);
-        if (axis.name.starts_with("precision.") && !v.find("values")) {  // one wire's bits
+        if (axis.name.starts_with("precision.") && !v.find("values")) {  // the bits of one wire
             Wire wire{};
             if (!find_wire(axis.name.substr(10), wire)) known(key, axis.name);
             if (find_wire(axis.name.substr(10), wire)) return edits(v, {wire}, axis);
@@ -237,7 +237,7 @@ class Reader {
         }
     }
 
-    // zip = { a = [1, 3], b = [2, 4] }: the lists are walked side by side.
+    // zip = { a = [1, 3], b = [2, 4] }: the lists are walked in step.
     void zip(const TomlValue& v, Axis& axis) const {
         std::vector<std::pair<std::string, std::vector<TomlValue>>> columns;
         const std::function<void(const TomlValue&, const std::string&)> walk =
@@ -417,7 +417,7 @@ class Reader {
     Scene settings_of_;
 };
 
-// A path in an override of a sweep without a scene file is meant from the sweep file's folder.
+// Without a scene file, a path in an override is relative to the sweep file's folder.
 void root_paths(SweepFile& sweep) {
     if (!sweep.scenes.empty() || sweep.folder.empty()) return;
     const auto root = [&](std::string& text) {
@@ -460,7 +460,7 @@ SweepFile parse_sweep(std::string_view text, const std::string& name, const std:
 }
 
 SweepFile read_sweep(const std::string& path, const std::vector<std::string>& overrides) {
-    read_toml(path);  // for its errors: no such file, too large
+    read_toml(path);  // throws where there is no such file or it is too large
     std::ifstream file(path, std::ios::binary);
     std::ostringstream text;
     text << file.rdbuf();

@@ -1,5 +1,5 @@
-// A sweep file: a scene, axes along which it changes, and what is measured at each point.  The format is
-// described in docs/sweeps.md.
+// A sweep file: a scene, the axes along which it changes, and what is measured at each point.  docs/sweeps.md
+// describes the format.
 #pragma once
 
 #include "scene/wires.h"
@@ -12,19 +12,19 @@
 
 namespace squint::sweep {
 
-/// A change of one part of a wire's Spec, whatever the rest of it is at that point.
+/// A change of one part of a wire's Spec; the other parts stay as they are at the point.
 struct WireEdit {
     enum class Part { fraction_bits, fraction_offset, integer_bits, integer_offset, rounding, overflow };
     Wire wire{};
     Part part{};
     int number = 0;    // of bits
-    std::string text;  // of a rounding or overflow rule
+    std::string text;  // the name of a rounding or overflow rule
     bool operator==(const WireEdit&) const = default;
 };
 
 /// One value of an axis.
 struct Choice {
-    std::string label;                   // as TOML: a number, or a string in quotes
+    std::string label;                   // as TOML: a number, or a text in quotes
     std::vector<std::string> overrides;  // key=value
     std::vector<WireEdit> edits;
 };
@@ -32,15 +32,15 @@ struct Choice {
 struct Axis {
     std::string name;
     std::vector<Choice> choices;
-    bool cross = false;  // in mode one_at_a_time: combined with every point all the same
-    std::string at;      // "sweep.toml:7:1", to begin a message with
+    bool cross = false;  // combined with every point even in mode one_at_a_time
+    std::string at;      // "sweep.toml:7:1", the beginning of a message
 };
 
-/// [wires]: an axis for every wire, in the order of the word-length literature: fraction bits of each wire,
-/// integer bits of each, rounding of each, then all together.
+/// [wires]: an axis for every wire, in the order of the literature on word lengths: each wire's fraction
+/// bits, each one's integer bits, each one's rounding, then all together.
 struct WireAxes {
     bool present = false;
-    std::vector<Wire> wires;  // empty: those that the scene uses
+    std::vector<Wire> wires;  // empty: the wires that the scene uses
     std::vector<int> fraction_bits, fraction_offset, integer_bits, integer_offset;
     std::vector<std::string> rounding;
     bool together = true;
@@ -51,18 +51,18 @@ enum class Mode { product, one_at_a_time, random };
 /// What is measured at a point.
 struct Measure {
     bool real = true;        // against the same pipeline in double: rounding alone
-    bool reference = false;  // against the exact integral: everything
-    bool srgb = false;       // colour differences as a display shows them, too
+    bool reference = false;  // against the exact integral: all errors
+    bool srgb = false;       // also colour differences as a display shows them
     bool ssim = true;
-    bool audit = false;         // ranges, saturation, wrap and stuck T: an audited render more
-    bool conservation = false;  // |C + T - 1| with every colour white and no light: a render more
-    int repeats = 0;            // timed renders of a point, alone; 0: not timed
-    int threads = 0;            // of a timed render; 0: one a processor
-    bool exr = false;           // keep every picture in full
-    int picture_size = 128;     // pixels a side of the pictures kept for the report; 0: none
+    bool audit = false;         // ranges, saturation, wrap and stuck T: one more render, audited
+    bool conservation = false;  // |C + T - 1| with white colours and no light: one more render
+    int repeats = 0;            // timed renders of a point, alone on the machine; 0: untimed
+    int threads = 0;            // of a timed render; 0: one per processor
+    bool exr = false;           // keep every picture as an EXR
+    int picture_size = 128;     // pixels a side of the pictures for the report; 0: none
 };
 
-/// A picture that every point is compared with: the point's own scene and these settings.
+/// A picture with which points are compared: the point's own scene with these settings.
 struct Baseline {
     std::string name;
     std::vector<std::string> overrides;
@@ -72,22 +72,22 @@ struct SweepFile {
     std::string name, folder, text;  // path as given, its folder, what it holds
     std::string title, note;
     std::vector<std::string> scenes;     // paths as written; empty: the built-in scene
-    std::vector<std::string> overrides;  // [base], then the command line's
+    std::vector<std::string> overrides;  // of [base], then of the command line
     std::vector<Axis> axes;
     WireAxes wires;
     Mode mode = Mode::product;
-    std::int64_t samples = 0;  // of mode random
+    std::int64_t samples = 0;  // for mode random
     std::uint64_t seed = 1;
     Measure measure;
     std::vector<Baseline> baselines;
 };
 
-/// Throws InputError `file:line:column: what, what was found, what is allowed`.
+/// Reads a sweep file.  Throws InputError `file:line:column: what, what was found, what is allowed`.
 SweepFile read_sweep(const std::string& path, const std::vector<std::string>& overrides = {});
 SweepFile parse_sweep(std::string_view text, const std::string& name, const std::string& folder,
                       const std::vector<std::string>& overrides = {});
 
-/// The path of scene `i`, relative to where the sweep file is; empty for the built-in scene.
+/// The path of scene `i`, relative to the sweep file's folder; empty for the built-in scene.
 std::string scene_path(const SweepFile& sweep, std::size_t i);
 
 /// The wire of that name, or none.

@@ -1,4 +1,4 @@
-// Pictures for reports: few pixels, but those exact to 16 bits.
+// Pictures for reports: few pixels, exact to 16 bits.
 #include "core/error.h"
 #include "studies/sweep/evaluate.h"
 

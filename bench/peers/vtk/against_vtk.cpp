@@ -1,10 +1,9 @@
 // squint against VTK's fixed-point mapper: the same scenes, frame by frame in turn, in one run.  Progress on
-// standard error, a line of JSON a case on standard output; bench/tables.py makes docs/measurements/vtk.md of
-// it.
+// standard error, a line of JSON for each case on standard output; bench/tables.py makes
+// docs/measurements/vtk.md of it.
 //
 //     SQUINT_DATA=... bench_against_vtk [scenes=cthead_opaque,...] [lit=0,1] [steps=1,0.5] [threads=1,2]
-//     [frames=8]
-//                                       [size=800] [every=4]
+//                                       [frames=8] [size=800] [every=4]
 #include "bench/peers/vtk/vtk_peer.h"
 #include "bench/support/support.h"
 #include "core/error.h"
@@ -41,7 +40,7 @@ struct Case {
     double step;
 };
 
-/// Plan and picture; adds its times.
+/// Makes plan and picture, and adds their times.
 Rendering timed(const Scene& scene, const std::shared_ptr<const Volume>& volume, int frame, int threads,
                 Times& times) {
     const Stopwatch watch;
@@ -160,7 +159,7 @@ Json compare_case(const Case& c, const Settings& settings) {
     return record;
 }
 
-/// Fog of one unit of 255 in a cube of 128: how the error goes as the step shrinks.
+/// Fog of one unit of 255 in a cube of 128: how its error changes as the step shrinks.
 Json fog(const Settings& settings) {
     Json points = Json::array();
     for (double step = 1; step >= 1.0 / 32; step /= 2) {

@@ -36,7 +36,7 @@ double ms_since(Clock::time_point start) {
     return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-/// A control point's value -> the level VTK sees; the next must be greater.
+/// A control point's value as the level that VTK sees; the next one must be greater.
 class Levels {
   public:
     explicit Levels(const Volume& volume) : volume_(volume) {}
@@ -53,7 +53,7 @@ class Levels {
     double last_ = -std::numeric_limits<double>::infinity();
 };
 
-/// The voxels where they lie, not a copy.
+/// The voxels in place, without a copy.
 template <class Array>
 void share_voxels(const Volume& volume, vtkImageData* image) {
     vtkNew<Array> array;
@@ -113,7 +113,7 @@ struct VtkPeer::Parts {
         const Vec3 low = plan.volume->origin,
                    high = plan.volume->world_from_voxel(Vec3(plan.volume->dims - Index3(1)));
         const double diagonal = (high - low).length();
-        // Parallel views stand off so that the box lies well between the clipping planes.
+        // Parallel views stand off, so that the box lies well between the clipping planes.
         const bool parallel = c.projection == Projection::orthographic;
         const Vec3 eye = parallel ? c.center - c.view * (2 * diagonal) : c.eye;
         const double distance = (c.center - eye).length();
@@ -136,13 +136,13 @@ struct VtkPeer::Parts {
             lights[i]->SetFocalPoint(c.center.x, c.center.y, c.center.z);
             lights[i]->SetPosition(at.x, at.y, at.z);
             lights[i]->SetColor(light.color.x, light.color.y, light.color.z);
-            // VTK adds the ambient weight once a light: ours counts once
+            // VTK adds ambient light once per light: ours counts it once
             const double ambient = i == 0 ? 1 : 0;
             lights[i]->SetAmbientColor(ambient, ambient, ambient);
         }
     }
 
-    /// VTK's picture starts at the bottom and covers the volume's bounding rectangle only.
+    /// VTK's picture starts at the bottom and covers only the volume's bounding rectangle.
     Image picture() const {
         vtkFixedPointRayCastImage* from = mapper->GetRayCastImage();
         int size[2], origin[2], memory[2];
@@ -168,7 +168,7 @@ struct VtkPeer::Parts {
 VtkPeer::VtkPeer(const Plan& plan, int threads) : parts_(std::make_unique<Parts>(plan)) {
     if (plan.lit && plan.camera.projection == Projection::perspective)
         throw InputError("camera.projection: VTK lights perspective views along the axis, not along rays");
-    // The block structure is built by as many threads as the rays.
+    // The block structure is built by as many threads as cast rays.
     vtkMultiThreader::SetGlobalMaximumNumberOfThreads(threads);
     vtkMultiThreader::SetGlobalDefaultNumberOfThreads(threads);
     Parts& p = *parts_;
@@ -285,7 +285,7 @@ Image VtkPeer::in_double(int every) const {
     int size[2], origin[2];
     p.mapper->GetRayCastImage()->GetImageInUseSize(size);
     p.mapper->GetRayCastImage()->GetImageOrigin(origin);
-    const int* bounds = p.mapper->GetRowBounds();  // pixels VTK casts no ray for stay empty here too
+    const int* bounds = p.mapper->GetRowBounds();  // VTK casts no ray outside them, nor do we
     Image image;
     image.width = p.camera.width, image.height = p.camera.height;
     for (const char* name : {"R", "G", "B", "A"}) image.add_float(name);
