@@ -114,7 +114,7 @@ std::int64_t image_bytes(const Scene& scene) {
 
 std::int64_t table_bytes(const Plan& plan) {
     std::int64_t bytes = 0;
-    Plan visited = plan;  // tables are shared, not copied
+    Plan visited = plan;  // copies share tables
     visit_stages(visited, SumTables{bytes});
     return bytes + static_cast<std::int64_t>(plan.entries.entry.size() * sizeof(Entry));
 }

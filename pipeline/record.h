@@ -1,5 +1,5 @@
-// What is recorded of a picture: the attributes of its EXR, its hash, its errors and what attributes them to
-// stages.
+// What is recorded of a picture: the attributes of its EXR, its hash, its errors, and the stages that cause
+// them.
 #pragma once
 
 #include "core/compare.h"
@@ -18,48 +18,48 @@ namespace squint {
 /// "0.1.0".
 std::string version();
 
-/// The resolved scene, the Spec of every wire, the data's hash and the version, each under a name that begins
-/// with `squint.`: nothing that differs from run to run or machine to machine.  Paths from the root are cut
-/// to the file's name.
+/// The resolved scene, the Spec of every wire, the data's hash and the version, under names that begin
+/// with `squint.`: nothing that differs between runs or machines.  An absolute path is cut to the file's
+/// name.
 Attributes exr_attributes(const Plan& plan, int frame = 0);
 
-/// Of size, channel names and every bit of every channel.
+/// A hash of size, channel names and every bit of every channel.
 std::string picture_hash(const Image& image);
 
-/// Bytes held for a picture.  A mapped file's voxels are not in the total: they stand on the disk.
+/// Bytes held for a picture.  The voxels of a mapped file do not count: they are on disk.
 struct Memory {
     std::int64_t volume = 0, mapped = 0, tables = 0, image = 0, buffers = 0;
     std::int64_t total() const { return volume + tables + image + buffers; }
 };
-std::int64_t image_bytes(const Scene& scene);  // of every channel the scene asks for
+std::int64_t image_bytes(const Scene& scene);  // of all channels that the scene asks for
 std::int64_t table_bytes(const Plan& plan);
 Memory memory_of(const Plan& plan, const RenderStatistics& statistics);
 
-/// What one stage's rounding does alone, the rest in double.
+/// The error of one stage's rounding alone, with the rest in double.
 struct StageError {
     std::string stage;
     Comparison against_real;
 };
 struct Errors {
-    std::optional<Comparison> against_real;       // rounding alone
-    std::optional<Comparison> against_reference;  // everything
-    std::vector<StageError> stages;               // of the modelled ones
+    std::optional<Comparison> against_real;       // of rounding alone
+    std::optional<Comparison> against_reference;  // of everything
+    std::vector<StageError> stages;               // those that are modelled
 };
 
-/// The plan of the same scene with precision.preset = real: nothing rounded, no wire's own Spec.
+/// The plan of the same scene with precision.preset = real: nothing is rounded, and no wire has its own Spec.
 Plan real_plan(const Plan& plan, int frame = 0);
 
-/// The wires of one stage; of every stage for "".
+/// The wires of one stage; of all stages for "".
 std::array<bool, kWires> wires_of(std::string_view stage);
 
-/// Renders `plan` in double and then each modelled stage's wires alone rounded, and compares R, G, B and A.
-/// `options` as for the picture itself; its audit is ignored.
+/// Renders `plan` in double, then with the wires of each modelled stage alone rounded, and compares R, G, B
+/// and A.  `options` are those of the picture; audit is ignored.
 Errors rounding_errors(const Plan& plan, const Image& picture, const RenderOptions& options, int frame = 0);
 
-/// R, G, B and A of two pictures of one scene.
+/// Compares R, G, B and A of two pictures of one scene.
 Comparison compare_colors(const Image& picture, const Image& other);
 
-// Parts of `--json`: the schema is docs/json.md.
+// Parts of `--json`; docs/json.md has the schema.
 nlohmann::ordered_json json_of(const Difference& difference);
 nlohmann::ordered_json json_of(const Comparison& comparison);
 nlohmann::ordered_json json_of(const Errors& errors);
@@ -68,7 +68,7 @@ nlohmann::ordered_json json_of(const Volume& volume);
 nlohmann::ordered_json json_of_scene(const Scene& scene);
 nlohmann::ordered_json json_of_wires(const Plan& plan);
 nlohmann::ordered_json json_of_audit(const Plan& plan, const RenderStatistics& statistics);
-/// One picture: time, samples, rays, path, target, memory, hash and, where asked for, audit and errors.
+/// A picture: time, samples, rays, path, target, memory, hash and, where asked for, audit and errors.
 nlohmann::ordered_json json_of(const Plan& plan, const Rendering& rendering, const Errors* errors,
                                bool audit);
 

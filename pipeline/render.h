@@ -1,4 +1,4 @@
-// Rendering a plan: the one entrance to every path through the pipeline.
+// Renders a plan: the one entrance to every path through the pipeline.
 #pragma once
 
 #include "core/image.h"
@@ -15,27 +15,27 @@ namespace squint {
 enum class Path { automatic, model, lanes };
 
 struct RenderOptions {
-    int threads = 0;  // 0: one a processor
+    int threads = 0;  // 0: one per processor
     int tile = 32;    // pixels a side
     Path path = Path::automatic;
-    std::string target;  // SIMD target by name ("AVX3", "AVX2", "SSE4", "EMU128"); empty: the best there is
+    std::string target;  // the name of a SIMD target ("AVX3", "AVX2", "SSE4", "EMU128"); empty: the best
     LayoutRule layout = LayoutRule::automatic;
     std::int64_t layout_bytes =
-        -1;              // room for a layout beside the volume itself; below 0: half of what is free
-    bool skip = true;    // leave out empty space
-    bool audit = false;  // count what every wire carried; runs the audited model
-    std::function<void(double)> progress;  // called with the part done, from any thread
+        -1;              // memory for a layout beside the volume itself; below 0: half of what is free
+    bool skip = true;    // skip empty space
+    bool audit = false;  // count what each wire carries; runs the audited model
+    std::function<void(double)> progress;  // gets the part done, from any thread
     const std::atomic<bool>* cancelled = nullptr;
 };
 
 struct RenderStatistics {
     std::string path, target, why, layout;  // what ran, and why
     int threads = 1;
-    std::int64_t rays = 0, samples = 0;  // rays that met the volume; slabs composited
-    std::int64_t visited = 0;            // slabs that went through the stages, and were not left out as empty
-    double seconds = 0;                  // ray casting alone
-    double setup_seconds = 0;  // layouts and block structures, where they were built for this picture
-    std::int64_t bytes = 0;    // volume layouts, tables and buffers
+    std::int64_t rays = 0, samples = 0;  // rays that meet the volume; slabs composited
+    std::int64_t visited = 0;            // slabs that went through the stages and were not skipped as empty
+    double seconds = 0;                  // of ray casting alone
+    double setup_seconds = 0;            // of layouts and blocks that were built for this picture
+    std::int64_t bytes = 0;              // volume layouts, tables and buffers
     std::array<WireStatistics, kWires> wires;  // with audit
 };
 
@@ -47,8 +47,8 @@ struct Rendering {
     RenderStatistics statistics;
 };
 
-/// R G B A and the channels the scene asks for.  The same bits for every thread count, tile size, path,
-/// target and layout.
+/// Renders R G B A and the channels that the scene asks for.  Threads, tiles, path, target and layout do not
+/// change a bit.
 Rendering render(const Plan& plan, const RenderOptions& options = {});
 
 }  // namespace squint

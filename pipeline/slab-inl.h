@@ -2,10 +2,10 @@
 //
 //     volume -> location -> interpolation -> gradient -> classification -> shading -> compositing -> pixel
 //
-// A template over the word, the classification, the source of voxels and an observer.  Who runs it is a
-// machine: the golden model, its audit and traces (machines/model.cpp), intervals (plan/ranges.cpp), tallies of
-// hardware (studies).  A machine that branches on a comparison asks any(): intervals take both ways.
-// Compiled once per SIMD target.
+// A template over the word, the classification, the source of voxels and an observer.  A machine runs it:
+// the golden model, its audit and traces (machines/model.cpp), intervals (plan/ranges.cpp), the tally of
+// hardware (studies).  A branch on a comparison asks any(): intervals take both ways.  Compiled once per
+// SIMD target.
 #if defined(SQUINT_PIPELINE_SLAB_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SQUINT_PIPELINE_SLAB_INL_H
 #undef SQUINT_PIPELINE_SLAB_INL_H
@@ -32,7 +32,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
-/// Voxels of a volume.  Fetching is apart from arithmetic: stages receive voxels, they do not index the
+/// The voxels of a volume.  Fetching is separate from arithmetic: stages receive voxels and do not index the
 /// volume.
 struct FromVolume {
     const Volume& volume;
@@ -62,7 +62,7 @@ struct FromVolume {
     }
 };
 
-/// MIP, MinIP, average: of a slab's two ends, or of what a ray has met so far and more of it.
+/// MIP, MinIP, average: adds the two ends of a slab to what the ray has met.
 template <class W>
 HWY_INLINE W merge_samples(CompositingMode mode, W kept, W next) {
     return mode == CompositingMode::mip     ? max(kept, next)
@@ -70,7 +70,7 @@ HWY_INLINE W merge_samples(CompositingMode mode, W kept, W next) {
                                             : kept + next;
 }
 
-/// The trapezoid's mean along a ray, rounded once: every slab counts the mean of its ends, by its length.
+/// The mean along a ray (trapezoid rule), rounded once: each slab counts its ends' mean, by its length.
 template <class W>
 HWY_INLINE W average_of(const Plan& plan, const ProjectedRay<W>& ray) {
     const W full = constant<W>(std::int64_t{1} << plan.location.length_fraction);
@@ -80,7 +80,7 @@ HWY_INLINE W average_of(const Plan& plan, const ProjectedRay<W>& ray) {
                   plan.input.highest);
 }
 
-/// The end of a projection: what stands for a ray is classified and composited as one slab.
+/// Ends a projection: the ray's value is classified and composited as one slab.
 template <class W, class M, class Observer>
 Accumulated<W> projected(const Plan& plan, const M& method, const ProjectedRay<W>& ray, Accumulated<W> pixel,
                          Observer& observer) {
@@ -96,11 +96,11 @@ Accumulated<W> projected(const Plan& plan, const M& method, const ProjectedRay<W
     return pixel;
 }
 
-/// The slabs of one ray, one after the other, through every stage onto its pixel.  `slabs`: their number.
+/// Takes the slabs of one ray, one after the other, through all stages to its pixel.  `slabs`: their number.
 template <class W, class M, class Voxels, class Observer = const Silent>
 class Slabs {
   public:
-    Accumulated<W> pixel;  // what the ray has gathered so far
+    Accumulated<W> pixel;  // gathered so far
 
     Slabs(const Plan& plan, const M& method, const Voxels& voxels, const RayWords<W>& ray, W slabs,
           Observer& observer)
@@ -113,8 +113,8 @@ class Slabs {
           last_(slabs - constant<W>(1)),
           backwards_(plan.compositing.form == CompositingForm::back_to_front) {}
 
-    /// Slab k.  A ray's slabs come in order, backwards ones from the last: of neighbours that need both ends
-    /// the sample between them is computed once.
+    /// Computes slab k.  Slabs come in order, or from the last where compositing runs backwards: neighbours
+    /// that need both ends compute the sample between them once.
     void step(W k) {
         observer_.slab(k);
         take_samples(k);
@@ -122,7 +122,7 @@ class Slabs {
         composite_slab(front_, back(), select(k == last_, ray_.last_length, full));
     }
 
-    /// Whether slabs behind this one can be seen.
+    /// Whether slabs behind this one can still be seen.
     auto goes_on() const { return HWY_NAMESPACE::goes_on(plan_.compositing, pixel); }
 
     /// Stages 1 and 2: sample k of the ray.
@@ -132,7 +132,7 @@ class Slabs {
                           locate(plan_.location, ray_, k, 2)});
     }
 
-    /// A projection's end.
+    /// Ends a projection.
     void project(const ProjectedRay<W>& ray) { pixel = projected(plan_, method_, ray, pixel, observer_); }
 
   private:
@@ -151,7 +151,7 @@ class Slabs {
     }
     Sample<W>& back() { return M::kNeedsBack ? back_ : front_; }
 
-    // Stages 4, 3 and 5, 6: one slab between two samples, or a part of one.
+    // Stages 4, 3 and 5, 6: one slab between two samples, or a part of it.
     void composite_slab(Sample<W>& front, Sample<W>& back, W length) {
         observer_.at(Part::classification);
         Slab<W> slab = classify(method_, front.input, back.input, length);
@@ -162,7 +162,7 @@ class Slabs {
         observer_.composited(slab, before, pixel);
     }
 
-    // Stages 3 and 5: what is seen of a slab, lit; by shading.inside with one normal or in pieces.
+    // Stages 3 and 5: lights what is visible of a slab, with one normal or in pieces, as shading.inside says.
     void light(Sample<W>& front, Sample<W>& back, W length, Slab<W>& slab) const {
         const InsideStage& inside = plan_.inside;
         if (inside.rule == InsideRule::front) return light_with(gradient_of(front), slab);
@@ -193,13 +193,13 @@ class Slabs {
         }
     }
 
-    // The straight colour of a slab of 2^bits lit pieces.
+    // The straight colour of a slab from 2^bits lit pieces.
     std::array<W, 3> light_in_pieces(const Sample<W>& front, const Sample<W>& back, W length,
                                      int bits) const {
         const InsideStage& inside = plan_.inside;
         PieceLight<W> sum = no_piece<W>(inside);
         W near = front.input, near_length = constant<W>(0);
-        bool seen = false;  // something of the slab
+        bool seen = false;  // whether something of the slab is visible
         for (int i = 1; i <= 1 << bits; ++i) {
             observer_.at(Part::classification);
             const bool last = i == 1 << bits;
@@ -217,7 +217,7 @@ class Slabs {
         return color_of_pieces(inside, sum);
     }
 
-    // Lights a slab, or a piece of one, by one raw gradient; the slab's normal is that of its first piece.
+    // Lights a slab or a piece of one by one raw gradient; a slab's normal is that of its first piece.
     void light_with(const std::array<W, 3>& gradient, Slab<W>& slab, bool is_first = true) const {
         observer_.at(Part::normal);
         const std::array<W, 3> normal = normalise(plan_.gradient, gradient);
@@ -227,12 +227,12 @@ class Slabs {
         shade(plan_.shading, ray_, normal, slab.alpha, slab.color, certain);
     }
 
-    // The raw gradient at an end, which two slabs share: computed once.
+    // The raw gradient at an end, which two slabs share; computed once.
     const std::array<W, 3>& gradient_of(Sample<W>& sample) const {
         if (!sample.has_gradient) sample.gradient = gradient_at(sample), sample.has_gradient = true;
         return sample.gradient;
     }
-    // The raw gradient `part` 2^-bits of the way from one sample to another.
+    // The raw gradient at `part` 2^-bits of the way from one sample to the other.
     std::array<W, 3> gradient_between(const Sample<W>& front, const Sample<W>& back, int part,
                                       int bits) const {
         observer_.at(Part::location);
@@ -261,7 +261,7 @@ class Slabs {
 
     CellPosition<W> position_of(const std::array<W, 3>& location) const {
         CellPosition<W> position = cell_position(plan_.location, location);
-        // A part of a cell: what its meaning says and intervals do not see.
+        // A place inside a cell is at most 1: intervals cannot see that.
         for (W& w : position.weight) w = within(w, 0, std::int64_t{1} << plan_.interpolation.weight_bits);
         return position;
     }
@@ -303,11 +303,11 @@ class Slabs {
     Observer& observer_;
     W last_;
     bool backwards_;
-    bool carries_ = false;  // the last slab's samples stand in front_ and back_
+    bool carries_ = false;  // front_ and back_ hold the samples of the last slab
     Sample<W> front_, back_;
 };
 
-/// A ray of `count` slabs through the volume onto its pixel; ends where nothing behind can be seen.
+/// Casts a ray of `count` slabs through the volume; it ends where nothing behind can be seen.
 template <class W, class M, class Voxels, class Observer>
 void cast_ray(const Plan& plan, const M& method, const Voxels& voxels, const RayWords<W>& ray,
               std::int64_t count, Observer& observer, Pixel<W>& pixel) {

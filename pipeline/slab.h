@@ -1,4 +1,4 @@
-// What the composition of the stages (slab-inl.h) hands on and reports: samples, pixels, parts and observers.
+// What the composition (slab-inl.h) passes on and reports: samples, pixels, parts and observers.
 #pragma once
 
 #include "pipeline/stages/compositing.h"
@@ -12,8 +12,8 @@
 
 namespace squint {
 
-/// Parts of the composition: the six stages, where one has two halves or a forerunner each of them.  An
-/// observer learns which part computes; ledgers of widths and costs are kept by part.
+/// Parts of the composition: the six stages; those with two halves, or a forerunner, are two parts.  An
+/// observer learns which part computes; widths and costs are recorded by part.
 enum class Part { location, interpolation, input, gradient, normal, classification, shading, compositing };
 inline constexpr int kParts = static_cast<int>(Part::compositing) + 1;
 /// The stage that a part belongs to, as an index of kStages (pipeline/plan/plan.h).
@@ -22,39 +22,39 @@ constexpr std::size_t stage_index(Part part) {
     return kStage[static_cast<std::size_t>(part)];
 }
 
-/// Stages 1 and 2 at one sample.
+/// A sample after stages 1 and 2.
 template <class W>
 struct Sample {
     std::array<W, 3> location;
     CellPosition<W> position;
-    W scalar;  // sample
+    W scalar;  // the interpolated sample
     W input;   // in table entries
-    // Stage 3, where a slab beside it was lit by it.
+    // Stage 3, where it has lit a slab beside this sample.
     std::array<W, 3> gradient;
     bool has_gradient = false;
 };
 
-/// MIP, MinIP, average: what stands for a ray of `slabs` slabs, one at least.
+/// MIP, MinIP, average: the state of a ray of `slabs` slabs, at least one.
 template <class W>
 struct ProjectedRay {
-    W kept;       // MIP, MinIP: the extreme of all samples; average: the sum of both ends of every full slab
-    W last_ends;  // average: the sum of the last slab's ends
+    W kept;       // MIP, MinIP: the extreme sample; average: the sum of both ends of every full slab
+    W last_ends;  // average: the sum of both ends of the last slab
     W slabs;
     W last_length;  // of the last slab, in steps
 };
 
-/// What one ray leaves behind.
+/// The result of one ray.
 template <class W>
 struct Pixel {
     Accumulated<W> gathered;
     std::int64_t samples = 0;  // slabs composited
-    // The rest is noted by an observer, where a picture asks for it (machines/aovs.h).
+    // An observer records the rest, where a picture asks for it (machines/aovs.h).
     std::optional<double> first_hit;  // distance from the ray's origin to the first visible slab, world units
     double weighted_distance = 0, weight = 0;  // sum of w z and of w
     std::array<W, 3> first_normal{};
 };
 
-/// Hears nothing.  An observer of the composition has these members; whatever it does changes no word.
+/// Observes nothing.  Every observer of the composition has these members, and changes no word.
 struct Silent {
     /// The composition enters a part.
     static constexpr void at(Part) {}
@@ -62,7 +62,7 @@ struct Silent {
     static constexpr void slab(const auto& /*k*/) {}
     /// A visible slab is about to be lit with this normal.
     static constexpr void lit(const auto& /*normal*/) {}
-    /// A slab, lit where it is, was composited: the pixel before and after it.
+    /// A slab, lit if light falls on it, was composited: the pixel before and after.
     static constexpr void composited(const auto& /*slab*/, const auto& /*before*/, const auto& /*after*/) {}
 };
 

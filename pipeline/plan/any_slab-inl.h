@@ -1,6 +1,6 @@
-// Any slab of any ray of a plan, once through the composition: for words that stand for every value a number can
-// take, intervals (ranges.cpp) and tallies (studies/sweep/cost.cpp).  Both ways of every branch are taken.
-// Compiled once per SIMD target.
+// Runs the composition once for any slab of any ray of a plan: for words that stand for all values of a
+// number, which are intervals (ranges.cpp) and tallies (studies/sweep/cost.cpp).  Both ways of each branch
+// are taken. Compiled once per SIMD target.
 #if defined(SQUINT_PIPELINE_PLAN_ANY_SLAB_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SQUINT_PIPELINE_PLAN_ANY_SLAB_INL_H
 #undef SQUINT_PIPELINE_PLAN_ANY_SLAB_INL_H
@@ -19,7 +19,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
-/// Any number in a range, on a wire of `width` bits.
+/// Any number of a range, on a wire of `width` bits.
 inline Range any_word(WordTag<Range>, const Range& range, int) {
     return range;
 }
@@ -33,7 +33,7 @@ inline const Range& range_of(const Tally& word) {
     return word.proven;
 }
 
-/// Anything that a volume holds, wherever it is.
+/// Any voxel that the volume can hold, at any place.
 template <class W>
 struct AnyVoxel {
     W voxel;
@@ -49,9 +49,9 @@ struct AnyVoxel {
     }
 };
 
-/// A slab, onto whatever the slabs before it have left; of a projection any sample, and the ray's end.  The
-/// first slab of a ray computes the samples at both its ends; with `neighbours` = 2 a second follows, which has
-/// one from the first.
+/// One slab, onto any pixel; of a projection, any sample and the ray's end.  The first slab of a ray computes
+/// the samples at both its ends; with `neighbours` = 2 a second slab follows, which shares one with the
+/// first.
 template <class W, class Observer>
 void any_slab(const Plan& plan, Observer& observer, int neighbours = 1) {
     const auto up_to = [](std::int64_t high, int width = 0) {
@@ -92,7 +92,7 @@ void any_slab(const Plan& plan, Observer& observer, int neighbours = 1) {
             observer.at(Part::classification);
             ProjectedRay<W> all{scalar, scalar, any_word(WordTag<W>{}, Range{1, most_slabs}, 0),
                                 ray.last_length};
-            if (plan.scene.compositing.mode == CompositingMode::average) {  // both ends of so many
+            if (plan.scene.compositing.mode == CompositingMode::average) {  // both ends of all slabs
                 const auto ends = 2 * static_cast<std::int64_t>(range_of(scalar).high);
                 all.kept = up_to(ends * most_slabs) + constant<W>(0);
                 all.last_ends = up_to(ends) + constant<W>(0);

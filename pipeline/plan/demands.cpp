@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kLsb8 = 255;
 
-int bits_above(double value) {  // the least b with 2^b >= value >= 1
+int bits_above(double value) {  // the least b with 2^b >= value, for value >= 1
     int bits = 0;
     while (std::ldexp(1.0, bits) < value) ++bits;
     return bits;
@@ -23,15 +23,15 @@ const Format& format_of(const Plan& plan, Wire wire) {
     return plan.specs[wire].format;
 }
 
-/// What a ray of up to `most` slabs, each of opacity `alpha` that errs by `error`, is off by: m error
-/// (1 - alpha)^m at its worst length m.
+/// The error of a ray of up to `most` slabs whose opacity `alpha` errs by `error`: m error (1 - alpha)^m at
+/// its worst length m.
 double along_ray(double alpha, double error, double most) {
     const double slabs = std::min(most, 1 / alpha);
     return slabs * error * portable::exp(-slabs * alpha);
 }
 
-/// Depths of a full step that neighbouring entries share, of those the data reaches: what a ray meets again
-/// and again, so that roundings of one sign add up.  Also of data that spans less than an entry.
+/// The depths of a full step that neighbouring entries share, among those that the data reaches: a ray meets
+/// them again and again, so that roundings of one sign add up.  Also for data that spans less than an entry.
 template <class F>
 void for_even_matter(const Plan& plan, const F& f) {
     const Volume& v = *plan.volume;
@@ -53,7 +53,7 @@ void for_even_matter(const Plan& plan, const F& f) {
     }
 }
 
-/// The most that opacities each wrong by `error` cost a ray of even matter, in LSB8; and of which opacity.
+/// The largest error, in LSB8, of a ray of even matter whose opacities err by `error`; and which opacity.
 struct Faint {
     double lsb8 = 0, alpha = 0;
 };
@@ -61,7 +61,7 @@ Faint faint_matter(const Plan& plan, double error) {
     Faint worst;
     if (plan.projection_mode) return worst;
     const double most = most_steps(plan);
-    double before = 0;  // runs of one depth are looked at once
+    double before = 0;  // equal depths in a row are tried once
     for_even_matter(plan, [&](double depth) {
         if (!(depth > 0) || depth == before) return;
         before = depth;
@@ -110,7 +110,7 @@ void warn_of_short_slabs(Plan& plan) {
 }
 void warn_of_highlights(Plan& plan) {
     if (!has_highlight(plan)) return;
-    // A dot of two words, rounded, and the squarings, each of which doubles what came before.
+    // A dot product of two rounded words, and the squarings, each of which doubles the error before it.
     const double dot = rounding_of(plan.specs[Wire::dot]) + rounding_of(plan.specs[Wire::normal]) +
                        rounding_of(plan.specs[Wire::light]) + rounding_of(plan.specs[Wire::power]);
     const double lsb8 = kLsb8 * plan.scene.shading.ks * std::min(1.0, plan.scene.shading.exponent * dot);
@@ -151,7 +151,7 @@ PresetInputs preset_inputs(const Plan& plan) {
     in.step = plan.scene.sampling.step;
     in.faint = faint_matter(plan, 0x1p-16).lsb8 > 0.5;
     in.whole_depth_bits = bits_for(deepest);
-    // Fewer entries than there are by default: a level is a part of an entry, and tells one opacity from another.
+    // Where entries are fewer than by default, a level is a part of an entry and must tell opacities apart.
     const int levels = static_cast<int>(volume.largest_representable()) + 1;
     if (plan.entries.size() < std::min(levels, kDefaultEntries))
         in.entry_levels_bits = bits_above(plan.entries.scalars_per_entry);

@@ -1,5 +1,5 @@
-// What a scene asks of the formats: of the preset before they are chosen, and of a user where the chosen ones
-// do not hold it.
+// What a scene demands of formats: of the preset, before they are chosen, and of the user, where the chosen
+// ones do not meet it.
 #pragma once
 
 #include "pipeline/plan/plan.h"
@@ -7,11 +7,11 @@
 
 namespace squint {
 
-/// What the preset's formats follow.  Reads scene, volume, entries, step_world and the box.
+/// What the preset's formats depend on.  Reads scene, volume, entries, step_world and the box.
 PresetInputs preset_inputs(const Plan& plan);
 
-/// Warnings with their figures, for formats that are there: matter they lose, short slabs and highlights they
-/// blur, colours that may pass their opacity.
+/// Adds warnings with figures where formats are too narrow: for matter they lose, short slabs and highlights
+/// they blur, colours that may exceed their opacity.
 void warn_of_formats(Plan& plan);
 
 }  // namespace squint

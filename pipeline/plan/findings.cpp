@@ -21,7 +21,7 @@ std::optional<std::string> clip_beside(const Plan& plan) {
     return std::nullopt;
 }
 
-/// Whether all corners of the box lie on the far side of a plane through which the camera sees nothing.
+/// Whether all corners of the box lie behind a plane beyond which the camera sees nothing.
 std::optional<std::string> camera_elsewhere(const Plan& plan) {
     const Camera& camera = plan.camera;
     const bool perspective = camera.projection == Projection::perspective;
@@ -46,7 +46,7 @@ std::optional<std::string> camera_elsewhere(const Plan& plan) {
     return std::nullopt;
 }
 
-/// Entries that samples of the data can meet.
+/// The entries that samples of the data can meet.
 struct MetEntries {
     std::size_t first, last;
 };
@@ -77,7 +77,7 @@ std::optional<std::string> function_outside(const Plan& plan, const MetEntries& 
     const auto first = std::find_if(points.begin(), points.end(), seen);
     if (first == points.end()) return fmt::format("transfer_function: every opacity is 0: {}", kEmpty);
     const auto last = std::find_if(points.rbegin(), points.rend(), seen);
-    // Opacity rises from the point before the first that is seen, and is constant beyond the ends.
+    // Opacity rises from the point before the first visible one, and is constant beyond the ends.
     const bool to_the_left = first == points.begin(), to_the_right = last == points.rbegin();
     const std::string where =
         to_the_right  ? fmt::format("above {:g}", to_the_left ? 0.0 : (first - 1)->value)

@@ -1,4 +1,4 @@
-// What of a scene leaves its picture empty or with two values, found before the first ray.
+// Finds what leaves a picture empty or with two values, before the first ray.
 #pragma once
 
 #include "pipeline/plan/plan.h"
@@ -8,8 +8,8 @@
 
 namespace squint {
 
-/// A line each: a clip box beside the volume, a volume behind the eye or beside the picture, a transfer function
-/// that shows nothing of the data's values, or one that changes within a hundredth of their range alone.
+/// A line each: a clip box outside the volume, a volume behind the eye or outside the picture, a transfer
+/// function that shows no value of the data, or one that changes only within a hundredth of their range.
 std::vector<std::string> findings_of(const Plan& plan);
 
 }  // namespace squint

@@ -50,7 +50,7 @@ void apply_overrides(const PrecisionSettings& precision, WireSpecs& specs) {
 ClassificationInputs classification_inputs(const Plan& plan) {
     double step = plan.step_world;
     if (plan.projection_mode)
-        step = plan.entries.unit_distance;  // one scalar stands for the ray: its opacity as declared
+        step = plan.entries.unit_distance;  // one scalar stands for the ray, with its opacity as declared
     return {plan.entries,
             plan.specs,
             plan.scene.classification,
@@ -74,7 +74,7 @@ void find_unseen_inputs(Plan& plan) {
     plan.unseen_from = input_at(behind - 1 + beside);
 }
 
-// What tables leave out along the longest ray, each and all.
+// The errors of tables along the longest ray, each and their sum.
 void report_approximations(Plan& plan) {
     if (plan.projection_mode) return;
     std::string parts;
@@ -133,7 +133,7 @@ InsideRule inside_rule(Plan& plan) {
 
 // ----------------------------------------------------------------------- what is left out, and why
 
-// A transparent sample changes nothing: empty space can be skipped.
+// A transparent sample changes nothing, so empty space can be skipped.
 bool transparent_is_identity(const Plan& plan) {
     const CompositingMode mode = plan.scene.compositing.mode;
     return plan.compositing.form != CompositingForm::unit255_shift && mode != CompositingMode::average &&
@@ -190,11 +190,11 @@ RaySetup Plan::set_up(int column, int row) const {
 }
 
 namespace {
-// What lanes of floats need: tables in floats, and room for float's own errors.
+// Lanes of floats need tables in floats, and room for the errors of floats.
 void prepare_floats(Plan& plan) {
     need_floats(plan.method);
     plan.shading.power_table.need_floats();
-    // Lanes ask whether an entry is opaque where any of them is near one: none may be missed.
+    // Lanes ask whether an entry is opaque where a lane is near one: none may be missed.
     const auto lower = [](EntryLookup& e) { e.least_opaque -= e.least_opaque >> 20; };
     std::visit(
         [&](auto& m) {
@@ -228,7 +228,7 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
     plan.wants_depth = scene.output.depth;
     preset_specs(precision.preset, preset_inputs(plan), plan.specs);
     keep_sums_exact(scene, plan.specs);
-    if (!plan.real) apply_overrides(precision, plan.specs);  // `real` has no formats to be given others
+    if (!plan.real) apply_overrides(precision, plan.specs);  // `real` has no formats to override
     report_stages(plan);
     StageInputs in{.scene = plan.scene,
                    .specs = plan.specs,
@@ -262,7 +262,7 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
 namespace {
 struct Activate {
     const std::array<bool, kWires>& rounded;
-    bool floats = false;  // unrounded cells of them will do
+    bool floats = false;  // float nodes suffice, without doubles
     void operator()(Rescale& r) const { r.active = r.wire >= 0 && rounded[static_cast<std::size_t>(r.wire)]; }
     void operator()(Table& t) const { t.active = t.wire >= 0 && rounded[static_cast<std::size_t>(t.wire)]; }
     void operator()(CellTable& t) const {

@@ -1,6 +1,6 @@
-// The plan: what a scene exercises, decided before the first ray.  Formats become shifts and limits, the
-// transfer function becomes tables, names become types, and each stage gets the narrowest word its exact
-// results fit.
+// The plan: decides before the first ray what a scene exercises.  Formats become shifts and limits, the
+// transfer function becomes tables, names become types, and each stage gets the narrowest word that holds its
+// exact results.
 #pragma once
 
 #include "core/camera.h"
@@ -26,12 +26,12 @@ namespace squint {
 inline constexpr std::array<std::string_view, 6> kStages{"sample location", "interpolation", "gradient",
                                                          "classification",  "shading",       "compositing"};
 
-/// What became of a stage.
+/// What the plan decided about a stage.
 struct StageReport {
     std::string name;
     bool modelled = true;
-    std::string why;  // left out, and why; or how it runs
-    WordNeeds needs;  // sign included
+    std::string why;  // why it is left out, or how it runs
+    WordNeeds needs;  // in bits, sign included
 };
 
 struct Plan {
@@ -40,10 +40,10 @@ struct Plan {
     Camera camera;
     Entries entries;
     WireSpecs specs;
-    bool real = false;      // presets `real` and `float32`: nothing quantised, words are doubles
+    bool real = false;      // presets `real` and `float32`: nothing is quantised, words are doubles
     bool float32 = false;   // or floats
-    double step_world = 1;  // length of a full slab
-    Vec3 box_low{0, 0, 0}, box_high{0, 0, 0};  // what of the volume is rendered, world
+    double step_world = 1;  // world units of a full slab
+    Vec3 box_low{0, 0, 0}, box_high{0, 0, 0};  // the rendered part of the volume, in world space
 
     LocationStage location;
     InterpolationStage interpolation;
@@ -55,52 +55,52 @@ struct Plan {
     CompositingStage compositing;
     bool lit = false;
     bool projection_mode = false;  // mip, minip, average
-    bool needs_back = false;       // slab methods classify by the samples at both ends
-    int entry_reach = 0;           // entries beside a slab's own that its colour may come from
-    // Inputs up to the one and from the other on are those of entries in which nothing is to be seen, nor in
-    // any beside them: a slab with both its ends there is transparent.
+    bool needs_back = false;       // slab methods need the samples at both ends
+    int entry_reach = 0;           // how many entries beside a slab's own may colour it
+    // Inputs up to the first and from the second on belong to entries where they and their neighbours show
+    // nothing: a slab with both ends there is transparent.
     std::int64_t unseen_to = -1, unseen_from = std::numeric_limits<std::int32_t>::max();
     bool wants_depth = false;
     Rescale to_average;             // average mode: sum of inputs over twice their length
     bool skips_empty_space = true;  // a transparent sample is the identity
 
     WordNeeds gradient_needs,
-        normal_needs;       // of stage 3's two halves: up to the raw gradient, and normalising it
+        normal_needs;       // of both halves of stage 3: the raw gradient, and its normalisation
     WordNeeds input_needs;  // of a sample on its way to table entries, between stages 2 and 4
     int word_bits = 64;     // of the golden model: 64 or 128
     std::vector<Wire>
-        used_wires;  // that carry anything, in order: found by running the stages over intervals
+        used_wires;  // those that carry anything, in order: found by running the stages over intervals
     std::vector<StageReport> stages;
     std::vector<TableReport> tables;
-    std::vector<Approximation> approximations;  // what tables leave out
+    std::vector<Approximation> approximations;  // errors of tables
     std::vector<std::string> notes;             // what a user should know
-    std::vector<std::string> warnings;          // what a user should mend
+    std::vector<std::string> warnings;          // what a user should change
 
     RaySetup set_up(int column, int row) const;
-    /// The preset whose words these are, where none is quantised.
+    /// The preset of these words, where none is quantised.
     std::string real_name() const { return float32 ? "float32" : "real"; }
-    /// Slab methods and projections look at both ends of every slab, a ray's exit among them.
+    /// Slab methods and projections look at both ends of each slab, and so at the ray's exit.
     bool samples_both_ends() const { return needs_back || projection_mode; }
-    /// Gradients that light a slab, side by side.
+    /// The number of gradients that light a slab.
     int gradients_a_slab() const { return inside.rule == InsideRule::mean ? 2 : 1; }
-    /// Whether stage 3 wants samples' locations, not their cells alone.
+    /// Whether stage 3 needs samples' locations, not only their cells.
     bool keeps_locations() const { return gradient_from_samples() || (lit && inside.samples_between()); }
     bool gradient_from_samples() const { return lit && gradient.rule == GradientRule::central_samples; }
     Spec spec(Wire wire) const { return specs[wire]; }
 };
 
-/// Resolves a scene against its volume.  Throws InputError, naming the wire and the bits it needs, for what
-/// no word holds.
+/// Resolves a scene against its volume.  Throws InputError naming the wire and the bits it needs, where no
+/// word holds them.
 Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int frame = 0);
 
-/// The same plan with only these wires rounded, the rest in double (attribution of errors to stages); `real`
+/// The same plan with only these wires rounded and the rest in double, to attribute errors to stages; `real`
 /// rounds none.
 void set_active(Plan& plan, const std::array<bool, kWires>& rounded);
 
 /// For audits: every Rescale of wire w counts into statistics[w].
 void attach_statistics(Plan& plan, std::array<WireStatistics, kWires>& statistics);
 
-/// Calls v(Rescale&) for every Rescale and v(Table&) or v(CellTable&) for every table of a plan.
+/// Calls v(Rescale&) for every Rescale of a plan, and v(Table&) or v(CellTable&) for every table.
 template <class V>
 void visit_stages(Plan& plan, V&& v) {
     plan.location.visit(v), plan.interpolation.visit(v), plan.gradient.visit(v), plan.input.visit(v);

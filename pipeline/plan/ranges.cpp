@@ -13,11 +13,11 @@ namespace {
 
 using namespace HWY_NAMESPACE;
 
-// Keeps what the composition needs, part by part, and the slab that it composited.
+// Records the needs of the composition, part by part, and the slab that it composited.
 class Ledger : public Silent {
   public:
     std::array<WordNeeds, kParts> needs;
-    Slab<Range> last{};  // composited
+    Slab<Range> last{};  // the one composited
 
     Ledger() { Range::needs = {}; }
     void at(Part part) {
@@ -42,17 +42,17 @@ struct LeaveOutLimits {
     void operator()(CellTable&) const {}
 };
 
-// Limits that meanings rule out where ranges cannot.
+// Drops limits that meaning rules out where intervals cannot.
 void leave_out_proven_limits(Plan& plan, const Slab<Range>& slab) {
-    // A location is clamped to the box, and its format holds the box.
+    // A location is clamped to the box, which its format holds.
     if (!plan.location.to_location.wraps) plan.location.to_location.limits = false;
-    // A part of a cell is one at most.
+    // A place inside a cell is at most 1.
     plan.location.to_weight.limits = false;
-    // A way from one place in the box to another.
+    // The difference of two places in the box.
     for (Rescale& r : plan.inside.to_location) r.limits = false;
-    // Form w: w = q(alpha T) <= T for alpha <= 1, so T never falls below 0.  c w rounds to w at most for c <=
-    // 1, so C, a sum of such shares, never passes the sum of all w, which is 1 - T.  (Lit colours may
-    // pass 1.)
+    // Form w: w = q(alpha T) <= T for alpha <= 1, so T never falls below 0.  c w rounds to at most w for c <=
+    // 1, so C, the sum of such shares, never exceeds the sum of all w, which is 1 - T.  (Lit colours may
+    // exceed 1.)
     CompositingStage& s = plan.compositing;
     const Format& color = plan.specs[Wire::color].format;
     const auto within_unit = [](const Range& x, int fraction) {

@@ -32,7 +32,7 @@ HWY_INLINE Accumulated<W> nothing_yet(const CompositingStage& s) {
             constant<W>(s.to_contribution.active ? s.first_remainder() : 0)};
 }
 
-/// w = alpha T: rounded, or with the remainder of the slabs before it and leaving its own.
+/// w = alpha T, rounded; in w_carry floored, with the remainder of earlier slabs added and the new one kept.
 template <class W>
 HWY_INLINE W contribution(const CompositingStage& s, W alpha, Accumulated<W>& pixel) {
     if (s.form == CompositingForm::w) return quantised_product(alpha, pixel.transparency, s.to_contribution);
@@ -43,13 +43,13 @@ HWY_INLINE W contribution(const CompositingStage& s, W alpha, Accumulated<W>& pi
     return w;
 }
 
-/// The transparency of what has been gathered.
+/// The transparency of all that was gathered.
 template <class W>
 HWY_INLINE W transparency(const CompositingStage& s, const Accumulated<W>& pixel) {
     return s.form == CompositingForm::alpha ? constant<W>(s.unit()) - pixel.transparency : pixel.transparency;
 }
 
-/// R G B A of what a pixel has gathered: where fixed point meets float.  Over a real word of core/rays-inl.h.
+/// R G B A of a pixel: where fixed point meets float.  Over a real word of core/rays-inl.h.
 template <class D>
 HWY_INLINE std::array<D, 4> color_of(const CompositingStage& s, const Accumulated<D>& pixel) {
     const double unit = static_cast<double>(s.unit());
@@ -59,7 +59,7 @@ HWY_INLINE std::array<D, 4> color_of(const CompositingStage& s, const Accumulate
             D(1) - t / Divisor(unit)};
 }
 
-/// Whether a ray goes on: T >= threshold.
+/// Whether a ray continues: T >= threshold.
 template <class W>
 HWY_INLINE auto goes_on(const CompositingStage& s, const Accumulated<W>& pixel) {
     return !(transparency(s, pixel) < constant<W>(s.threshold));
@@ -69,7 +69,7 @@ HWY_INLINE auto goes_on(const CompositingStage& s, const Accumulated<W>& pixel) 
     return !(transparency(s, pixel) < W::from(s.threshold_exact * static_cast<double>(s.unit())));
 }
 
-/// x y with 1.0 = 2^F - 1: one bare shift, or Blinn's exact rounding of x y / (2^F - 1) (Squeeze, equation
+/// x y where 1.0 is 2^F - 1: a bare shift, or Blinn's exact rounding of x y / (2^F - 1) (Squeeze, equation
 /// 1).
 template <class W>
 HWY_INLINE W unit_product(const CompositingStage& s, W x, W y) {
@@ -84,7 +84,7 @@ HWY_INLINE W unit_product(const CompositingStage& s, W x, W y) {
     return x * y / constant<W>(s.unit());
 }
 
-/// One slab onto a pixel.
+/// Composites one slab onto a pixel.
 template <class W>
 HWY_INLINE void composite(const CompositingStage& s, Accumulated<W>& pixel, std::array<W, 3> color, W alpha) {
     const W one = constant<W>(std::int64_t{1} << s.transparency_fraction);

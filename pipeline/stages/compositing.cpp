@@ -14,7 +14,7 @@ CompositingForm form_of(const Scene& scene) {
 }
 
 void keep_sums_exact(const Scene& scene, WireSpecs& specs) {
-    constexpr int kWidest = 29;  // a sum of two numbers of u1.29 fits a lane of 32 bits
+    constexpr int kWidest = 29;  // the sum of two u1.29 fits a 32-bit lane
     if (form_of(scene) != CompositingForm::w_carry) return;
     const auto fraction_bits = [&](Wire wire) { return specs[wire].format.fraction_bits; };
     const int color = std::max(
@@ -54,7 +54,7 @@ CompositingStage build_compositing(const StageInputs& in) {
     s.to_contribution = rescale(in, s.alpha_fraction + t, Wire::contribution);
     if (s.form == CompositingForm::w_carry) {
         require_integer_bits(in, Wire::contribution, 1, "an opacity of 1.0 in form w_carry");
-        // Nothing is rounded: the remainder is carried.
+        // Nothing is rounded, because the remainder is carried.
         Spec floor = in.specs[Wire::contribution];
         floor.rounding = Rounding::trn;
         s.to_contribution = Rescale(s.alpha_fraction + t, floor, wire_index(Wire::contribution));
@@ -74,7 +74,7 @@ CompositingStage build_compositing(const StageInputs& in) {
             s.to_color = rescale(in, s.color_fraction + t, Wire::color);
             s.to_transparency = rescale(in, t + s.alpha_fraction, Wire::transparency);
     }
-    // Codes of the [0, 2^F - 1] representation are integers: rounded to nearest, limited to the unit.
+    // Codes of the [0, 2^F - 1] representation are integers: rounded to nearest, limited to 2^F - 1.
     s.alpha_to_code = s.color_to_code = Rescale(
         s.alpha_fraction, Spec{{t, 0, false}, Rounding::rnd, Overflow::sat}, wire_index(Wire::contribution));
     if (s.is_unit255()) {

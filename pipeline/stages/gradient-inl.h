@@ -23,7 +23,7 @@ HWY_INLINE auto central_difference(const N& n, int x, int y, int z, int axis) {
     return n.at(x + dx, y + dy, z + dz) - n.at(x - dx, y - dy, z - dz);
 }
 
-/// 32 times the Sobel gradient along an axis at one voxel: (-1 0 1) along it, (1 2 1) across it twice.
+/// 32 times the Sobel gradient along an axis at one voxel: (-1 0 1) along it, (1 2 1) twice across it.
 template <class W, class N>
 HWY_INLINE W sobel_difference(const N& n, int x, int y, int z, int axis) {
     W sum = constant<W>(0);
@@ -38,7 +38,7 @@ HWY_INLINE W sobel_difference(const N& n, int x, int y, int z, int axis) {
     return sum;
 }
 
-/// Between the differences at two neighbours along x, the cell's own in row (y, z).
+/// Interpolates along x between the differences at two neighbours, in row (y, z) of the cell.
 template <class W, class N>
 HWY_INLINE W lerped_difference(const GradientStage& s, const N& n, int y, int z, int axis, W weight) {
     const auto at = [&](int x) {
@@ -48,7 +48,7 @@ HWY_INLINE W lerped_difference(const GradientStage& s, const N& n, int y, int z,
     return lerp(at(1), at(2), weight, s.weight_bits, s.to_first);
 }
 
-/// Differences at the cell's eight voxels, interpolated like a sample.
+/// Interpolates the differences at the cell's eight voxels like a sample.
 template <class W, class N>
 HWY_INLINE W interpolated_difference(const GradientStage& s, const N& n, const std::array<W, 3>& weight,
                                      int axis) {
@@ -59,7 +59,7 @@ HWY_INLINE W interpolated_difference(const GradientStage& s, const N& n, const s
     return lerp(z0, z1, weight[2], s.weight_bits, s.to_gradient);
 }
 
-/// The exact derivative of the trilinear cell along an axis: the four edges' differences, interpolated
+/// The exact derivative of the trilinear cell along an axis: the differences of its four edges, interpolated
 /// across.
 template <class W, class N>
 HWY_INLINE W analytic_difference(const GradientStage& s, const N& n, const std::array<W, 3>& weight,
@@ -77,14 +77,14 @@ HWY_INLINE W analytic_difference(const GradientStage& s, const N& n, const std::
     return lerp(b0, b1, weight[second], bits, s.to_gradient);
 }
 
-/// A component of the gradient from the voxels about a cell, by the stage's rule.
+/// A component of the gradient from the voxels around a cell, by the stage's rule.
 template <class W, class N>
 HWY_INLINE W voxel_difference(const GradientStage& s, const N& n, const std::array<W, 3>& weight, int axis) {
     return s.rule == GradientRule::analytic ? analytic_difference(s, n, weight, axis)
                                             : interpolated_difference(s, n, weight, axis);
 }
 
-/// Samples one voxel to either side along an axis: their difference, halved (Squeeze, section 4.3).
+/// Half the difference of the samples one voxel to either side along an axis (Squeeze, section 4.3).
 template <class W>
 HWY_INLINE W sample_difference(const GradientStage& s, W ahead, W behind) {
     return quantise(ahead - behind, s.to_gradient);
@@ -100,10 +100,10 @@ HWY_INLINE W to_world(const GradientStage& s, W component, int axis) {
                     s.to_scaled);
 }
 
-/// -g / |g| in s1.F, in integers.  Steps: scale so that the largest component has kNormalBits bits (floor of
-/// its magnitude), n = floor(sqrt(sum of squares) 2^kNormalGuard), then three exact quotients.  Error: 2^-14
-/// from the scaling where the gradient has more bits than that, plus half a last bit of the wire.  A zero
-/// gradient gives a zero normal.
+/// -g / |g| in s1.F, in integers: scales so that the largest component has kNormalBits bits (floor of its
+/// magnitude), takes n = floor(sqrt(sum of squares) 2^kNormalGuard), then three exact quotients.  Error:
+/// 2^-14 from scaling, where the gradient has more bits, plus half a last bit of the wire.  A zero gradient
+/// gives a zero normal.
 template <class W>
 HWY_INLINE std::array<W, 3> normalise(const GradientStage& s, const std::array<W, 3>& gradient) {
     const W zero = constant<W>(0);
@@ -121,8 +121,8 @@ HWY_INLINE std::array<W, 3> normalise(const GradientStage& s, const std::array<W
     return normal;
 }
 
-/// min(1, |g| / g_0) in 1.F, in integers: one where |g| >= g_0.  Error: 2^-13 of it where g_0 has more than
-/// kNormalBits bits, for what they drop must not leave a full length below one; plus half a last bit.
+/// min(1, |g| / g_0) in 1.F, in integers: exactly one where |g| >= g_0.  Relative error: 2^-13 where g_0 has
+/// more than kNormalBits bits (no length of g_0 may come out below one), plus half a last bit.
 template <class W>
 HWY_INLINE W confidence(const GradientStage& s, const std::array<W, 3>& gradient) {
     std::array<W, 3> size;
@@ -144,7 +144,7 @@ HWY_INLINE W confidence(const GradientStage& s, const std::array<W, 3>& g) {
     return quantise(shift_left(part, s.confidence_fraction), raw);
 }
 
-/// Without rounding the definition itself will do, but for what is too short to be more than a rounding.
+/// Without rounding: the definition itself, but zero for what is no longer than a rounding.
 template <RealWord W>
 HWY_INLINE std::array<W, 3> normalise(const GradientStage& s, const std::array<W, 3>& g) {
     const W zero = constant<W>(0), shortest = W::from(s.vanishing);

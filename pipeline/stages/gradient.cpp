@@ -11,7 +11,7 @@ std::vector<WireFormats> gradient_wires(const PresetInputs& in) {
     constexpr Rounding trn = Rounding::trn;
     const int scalar = in.scalar_bits, range = in.gradient_bits > 0 ? in.gradient_bits : scalar,
               sharp = highlight_bits(in);
-    // Weak gradients want fraction bits; a difference of scalars, halved, has one bit less than they.
+    // Weak gradients need fraction bits; half a difference of scalars has one bit less than they.
     const Spec standard = signed_spec(range, std::min(12, 32 - range - weight_bits(in)), kToEven),
                squeeze = signed_spec(12, 12, trn), eight_bit = signed_spec(scalar, 1, trn),
                wide = signed_spec(scalar, 16, kToEven);
@@ -33,8 +33,8 @@ GradientStage build_gradient(const StageInputs& in) {
     s.rule = in.scene.shading.gradient;
     s.weight_bits = fraction(in, Wire::weight);
     s.sample_fraction = fraction(in, Wire::sample);
-    // Differences are twice (central), 32 times (Sobel) or once (analytic) the gradient: so many fraction
-    // bits to begin with.
+    // Differences are the gradient times 2 (central), 32 (Sobel) or 1 (analytic): that many fraction bits at
+    // first.
     const int first = s.rule == GradientRule::central ? 1 : s.rule == GradientRule::sobel ? 5 : 0;
     s.to_first = rescale(in, first + s.weight_bits, Wire::gradient_lerp);
     s.to_second = rescale(in, fraction(in, Wire::gradient_lerp) + s.weight_bits, Wire::gradient_lerp);
@@ -61,7 +61,7 @@ GradientStage build_gradient(const StageInputs& in) {
     s.to_confidence.divides = true;
     if (const double floor = in.scene.shading.gradient_floor; in.lit && floor > 0) {
         require_integer_bits(in, Wire::confidence, 1, "a confidence of 1.0");
-        // The sum of a slab's two gradients is twice as long as their mean.
+        // The sum of the gradients at a slab's ends is twice as long as their mean.
         fade_in_up_to(s, (in.inside == InsideRule::mean ? 2 : 1) * floor * one);
     }
     return s;

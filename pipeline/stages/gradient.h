@@ -1,7 +1,7 @@
-// Stage 3: gradient.  voxels around a cell (I.0) and weights (1.F) -> raw gradient (sI.F, levels per smallest
-// voxel spacing)
-// -> normal (s1.F).  Squeeze, section 4.3.  Runs only where a light falls on a sample that is not
-// transparent.
+// Stage 3: gradient.  Voxels around a cell (I.0) and weights (1.F) -> raw gradient (sI.F, levels per smallest
+// voxel spacing) -> normal (s1.F).  Squeeze, section 4.3.
+//
+// Runs only where a light falls on a sample that is not transparent.
 #pragma once
 
 #include "fixedpoint/words.h"
@@ -20,26 +20,26 @@ struct StageInputs;
 struct GradientStage {
     GradientRule rule = GradientRule::central;
     int weight_bits = 0;
-    int sample_fraction = 0;                // central_samples: fraction bits of the six samples
+    int sample_fraction = 0;                // central_samples: of the six samples
     Rescale to_first, to_second;            // lerp levels
-    Rescale to_gradient;                    // third level, or the difference of samples
-    Rescale to_scaled;                      // after the axis's own spacing
-    std::array<std::int64_t, 3> spacing{};  // raw, in the wire's format; one where spacings are equal
+    Rescale to_gradient;                    // third level, or difference of samples
+    Rescale to_scaled;                      // after scaling by the axis's own spacing
+    std::array<std::int64_t, 3> spacing{};  // raw, in the wire's format; one where all spacings are equal
     int spacing_fraction = 0;
     bool isotropic = true;
     std::array<double, 3> spacing_exact{1, 1, 1};
     bool active = true;
     Rescale to_normal;  // quotient of a component and the length
     int normal_fraction = 0;
-    // Real: below this, in raw units, a gradient is zero.  A rounding alone can leave it 1e-13 long, and
-    // normalised that is a full normal where the field is flat.
+    // Real: a gradient below this, in raw units, is zero.  Rounding alone can leave it 1e-13 long, and
+    // normalising would make a full normal of that where the field is flat.
     double vanishing = 0;
-    // Light that fades in up to |g| = g_0.  Components up to g_0, shifted so that it has kNormalBits bits.
+    // Light fades in up to |g| = g_0.  Components up to g_0 are shifted so that it has kNormalBits bits.
     bool fades = false;
     double floor_exact = 0;        // g_0 in raw units
     std::int64_t floor_raw = 0;    // its floor
-    int floor_bits = 0;            // shifted left by; negative: right
-    std::int64_t full_length = 0;  // from which on confidence is one, with kNormalGuard fraction bits
+    int floor_bits = 0;            // left shift; negative: right
+    std::int64_t full_length = 0;  // confidence is one from here on, with kNormalGuard fraction bits
     int confidence_fraction = 0;
     Rescale to_confidence;
 
@@ -48,16 +48,16 @@ struct GradientStage {
         v(to_first), v(to_second), v(to_gradient), v(to_scaled), v(to_normal), v(to_confidence);
     }
 };
-/// The stage's constants.  Throws InputError where a wire is unsigned and the scene is lit.
+/// Builds the stage's constants.  Throws InputError where a wire is unsigned and the scene is lit.
 GradientStage build_gradient(const StageInputs& in);
 
-/// Bits that normalising keeps of the largest component, and fraction bits it gives the length.
+/// Bits that normalising keeps of the largest component, and fraction bits of the length.
 inline constexpr int kNormalBits = 15, kNormalGuard = 8;
 
-/// A gradient below this part of the data's range, in levels per smallest voxel spacing, is zero in doubles.
+/// In doubles a gradient below this part of the data's range, in levels per smallest spacing, is zero.
 inline constexpr double kVanishing = 0x1p-40;
 
-/// Lets light fade in up to gradients of `length`, in raw units and above 0.
+/// Lets light fade in for gradients up to `length`, which is in raw units and above 0.
 inline void fade_in_up_to(GradientStage& s, double length) {
     s.fades = true;
     s.floor_exact = length;
@@ -68,7 +68,7 @@ inline void fade_in_up_to(GradientStage& s, double length) {
                                      : s.floor_raw << s.floor_bits << kNormalGuard;
 }
 
-/// The 4x4x4 voxels about a cell, the cell's corners in the middle; x fastest.  Clamped at the volume's
+/// The 4x4x4 voxels around a cell, with the cell's corners in the middle; x fastest.  Clamped at the volume's
 /// faces.
 template <class W>
 struct Neighbourhood {

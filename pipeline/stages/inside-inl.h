@@ -16,7 +16,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
-/// The location `part` 2^-bits of the way from a slab's front to its back, rounded once.
+/// The location at `part` 2^-bits of the way from a slab's front to its back, rounded once.
 template <class W>
 HWY_INLINE std::array<W, 3> location_between(const InsideStage& s, const std::array<W, 3>& front,
                                              const std::array<W, 3>& back, int part, int bits) {
@@ -28,19 +28,19 @@ HWY_INLINE std::array<W, 3> location_between(const InsideStage& s, const std::ar
     });
     return between;
 }
-/// The input there on the straight line that a slab stands for.
+/// The input there, on the straight line between the slab's ends.
 template <class W>
 HWY_INLINE W input_between(const InsideStage& s, W front, W back, int part, int bits) {
     const W way = quantise((back - front) * constant<W>(part), s.to_input[static_cast<std::size_t>(bits)]);
     return within(front + way, 0, s.highest_input);
 }
-/// The length of a slab up to there.
+/// The length of the slab up to there.
 template <class W>
 HWY_INLINE W length_up_to(const InsideStage& s, W length, int part, int bits) {
     return quantise(length * constant<W>(part), s.to_length[static_cast<std::size_t>(bits)]);
 }
 
-/// A gradient with its largest component shifted to kTurnBits bits, and its length's floor.
+/// A gradient whose largest component is shifted to kTurnBits bits, and the floor of its length.
 inline constexpr int kTurnBits = 12;
 template <class W>
 struct Turn {
@@ -65,9 +65,9 @@ template <RealWord W>
 HWY_INLINE Turn<W> turn_of(const std::array<W, 3>& g) {
     return {g, square_root(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])};
 }
-/// log2 of the pieces in which a slab is lit whose ends have these raw gradients: one up to 14.4 degrees
-/// (cosine 31/32), two up to 44.0 (23/32), else four; one where either is zero.  Error of an angle: 0.1
-/// degrees.
+/// log2 of the number of pieces in which a slab is lit, from the raw gradients at its ends: one piece up to
+/// 14.4 degrees (cosine 31/32), two up to 44.0 (23/32), else four; one where either gradient is zero.  Angles
+/// err by 0.1 degrees.
 template <class W>
 HWY_INLINE W cuts_between(const std::array<W, 3>& front, const std::array<W, 3>& back) {
     const Turn<W> f = turn_of(front), b = turn_of(back);
@@ -78,11 +78,11 @@ HWY_INLINE W cuts_between(const std::array<W, 3>& front, const std::array<W, 3>&
     return select(dot < constant<W>(23) * lengths, two, select(dot < constant<W>(31) * lengths, one, zero));
 }
 
-/// The light of a slab's pieces, front to back, as their straight colour.
+/// The light of a slab's pieces, front to back, joined to one straight colour.
 template <class W>
 struct PieceLight {
     std::array<W, 3> light;
-    W through;  // what the pieces so far let pass
+    W through;  // the transparency of the pieces so far
 };
 template <class W>
 HWY_INLINE PieceLight<W> no_piece(const InsideStage& s) {

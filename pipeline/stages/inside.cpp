@@ -9,7 +9,7 @@
 namespace squint {
 namespace {
 
-// Of a way along a slab, which may lead back.
+// The difference of two places along a slab; it may be negative.
 Rescale to_way(const StageInputs& in, Wire wire, int bits) {
     Spec spec = in.specs[wire];
     spec.format.is_signed = true, spec.overflow = Overflow::sat;
@@ -28,7 +28,7 @@ InsideStage build_inside(const StageInputs& in, const LocationStage& location) {
         s.to_input[at] = to_way(in, Wire::classification_input, b);
         s.to_length[at] = rescale(in, fraction(in, Wire::length) + b, Wire::length);
     }
-    // A slab's ends are a step apart, and what rounding moved them by.
+    // The ends of a slab are a step apart, plus their roundings.
     const double apart = in.scene.sampling.step + 2 * location.drift() + 1;
     const auto one = static_cast<double>(in.specs[Wire::location].format.one());
     s.limit = location.limit;
@@ -41,7 +41,7 @@ InsideStage build_inside(const StageInputs& in, const LocationStage& location) {
     s.largest_lit = in.specs[Wire::lit_color].format.largest();
     s.least_cut = std::max<std::int64_t>(s.one_alpha >> 10, 32);
     s.to_part = rescale(in, 2 * fraction(in, Wire::slab_alpha), Wire::slab_alpha);
-    // Of no wire: intervals do not see that a mean of lit colours needs no limit, and would give lit_color one.
+    // Belongs to no wire: intervals cannot see that a mean of lit colours needs no limit.
     s.to_whole = Rescale(fraction(in, Wire::lit_color), in.specs[Wire::lit_color]);
     s.to_whole.divides = true;
     return s;

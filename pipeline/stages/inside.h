@@ -2,10 +2,10 @@
 // turns is lit in pieces.  docs/conventions.md#light; docs/papers/guetat.md.
 //
 //     mean       the mean of the raw gradients at both ends
-//     front      the front end's
-//     middle     one, sampled at the slab's middle
-//     adaptive   by the angle between the ends' gradients 1, 2 or 4 pieces, each a slab of the method's own
-//                tables with a gradient sampled at its middle
+//     front      the gradient at the front end
+//     middle     one gradient, sampled at the slab's middle
+//     adaptive   1, 2 or 4 pieces, by the angle between the gradients at the ends; a piece is a slab of the
+//                method's own tables with a gradient sampled at its middle
 #pragma once
 
 #include "fixedpoint/words.h"
@@ -16,21 +16,21 @@
 
 namespace squint {
 
-/// A slab is cut in 2^kMostCuts pieces at most.
+/// A slab is cut into at most 2^kMostCuts pieces.
 inline constexpr int kMostCuts = 2;
 
 struct InsideStage {
     InsideRule rule = InsideRule::mean;
-    // Of places k 2^-b along a slab, by b: a piece's middle needs one bit more than its ends.
+    // For places k 2^-b along a slab, by b: a piece's middle needs one bit more than its ends.
     std::array<Rescale, kMostCuts + 2> to_location;
     std::array<Rescale, kMostCuts + 1> to_input, to_length;
-    std::array<std::int64_t, 3> most_apart{};  // a slab's ends, as locations
+    std::array<std::int64_t, 3> most_apart{};  // of the two ends of a slab, as locations
     std::array<std::int64_t, 3> limit{};       // the last voxel centre
     std::int64_t highest_input = 0;
-    std::int64_t least_cut = 0;  // opacity from which on a slab is worth cutting: 2^-10, or 32 last bits
+    std::int64_t least_cut = 0;  // slabs of less opacity are not cut: 2^-10, or 32 last bits
     std::int64_t one_alpha = 0, largest_lit = 0;
-    Rescale to_part;   // of the light behind earlier pieces
-    Rescale to_whole;  // pieces' light over their opacity
+    Rescale to_part;   // light behind earlier pieces
+    Rescale to_whole;  // light of all pieces over their opacity
 
     bool needs_back() const { return rule != InsideRule::front; }
     /// Whether gradients are sampled between a slab's ends.

@@ -22,8 +22,8 @@ HWY_INLINE W lerp(W v0, W v1, W weight, int weight_bits, const Rescale& to) {
     return quantise(blend(v0, v1, weight, weight_bits), to);
 }
 
-/// Seven lerps: four along x, two along y, one along z.  Each level has a format of its own.  C: a Cell,
-/// however its corners are kept.
+/// Seven lerps: four along x, two along y, one along z; each level has its own format.  C is a Cell, whatever
+/// holds its corners.
 template <class W, class C>
 HWY_INLINE W interpolate(const InterpolationStage& s, const C& cell, const std::array<W, 3>& weight) {
     if (s.nearest) {

@@ -12,8 +12,8 @@ namespace squint {
 std::vector<WireFormats> interpolation_wires(const PresetInputs& in) {
     constexpr Rounding trn = Rounding::trn;
     const int scalar = in.scalar_bits;
-    // Lerp levels are cut so that every exact product fits a 32-bit word, I + level + weight <= 31: 12 bits of
-    // weight leave the middle levels 19 - I fraction bits.
+    // Lerp levels are cut so that every exact product fits a 32-bit word, I + level + weight <= 31: with 12
+    // bits of weight, the middle levels have 19 - I fraction bits.
     const Spec level = unsigned_spec(scalar, 31 - scalar - weight_bits(in), kHalvesUp),
                squeeze = unsigned_spec(12, 12, trn), whole = unsigned_spec(scalar, 0, trn),
                wide = unsigned_spec(scalar, std::min(20, 30 - scalar), kToEven);

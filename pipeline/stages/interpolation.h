@@ -1,4 +1,4 @@
-// Stage 2: interpolation.  eight corners (I.0) and cell weights (1.F) -> sample (I.F).  Squeeze, section 4.5,
+// Stage 2: interpolation.  Eight corners (I.0) and cell weights (1.F) -> sample (I.F).  Squeeze, section 4.5,
 // equation 15.
 #pragma once
 
@@ -11,7 +11,7 @@ namespace squint {
 struct StageInputs;
 
 struct InterpolationStage {
-    int weight_bits = 0;  // fraction bits of a weight: one is 1 << weight_bits
+    int weight_bits = 0;  // of a weight: one is 1 << weight_bits
     Rescale to_x, to_y, to_sample;
     int sample_fraction = 0;
     bool nearest = false;
@@ -21,15 +21,15 @@ struct InterpolationStage {
         v(to_x), v(to_y), v(to_sample);
     }
 };
-/// The stage's constants.  Throws InputError where a wire cannot hold the scalars or a weight of one.
+/// Builds the stage's constants.  Throws InputError where a wire cannot hold the scalars or a weight of one.
 InterpolationStage build_interpolation(const StageInputs& in);
 
-/// Corners in the order x fastest: 000 100 010 110 001 101 011 111.
+/// The corners of a cell, x fastest: 000 100 010 110 001 101 011 111.
 template <class W>
 struct Cell {
     std::array<W, 8> corner;
     W at(int i) const { return corner[static_cast<std::size_t>(i)]; }
-    /// Between corners 2 i and 2 i + 1.
+    /// Interpolates between corners 2 i and 2 i + 1.
     W along_x(int i, W weight, int weight_bits, const Rescale& to) const {
         return quantise(blend(at(2 * i), at(2 * i + 1), weight, weight_bits), to);
     }

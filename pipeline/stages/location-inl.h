@@ -18,8 +18,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
-/// A constant in words: the rounded one, or (Real, inactive) the exact one in raw units.  `wire`: the one whose
-/// format it stands in.
+/// A constant in words: rounded, or (Real, inactive) exact in raw units.  `wire`: the wire of its
+/// format.
 template <class W>
 HWY_INLINE W stage_constant(std::int64_t raw, double, int, bool, std::optional<Wire> wire = {}) {
     if (wire) note_wire(WordTag<W>{}, static_cast<int>(*wire));
@@ -46,7 +46,7 @@ HWY_INLINE W exact_location(const LocationStage& s, const RayWords<W>& ray, W k,
     const W start = shift_left(ray.first[a], s.common_fraction - s.location_fraction);
     return affine(start, k, stride(s, ray, axis), s.low[a], s.high[a]);
 }
-/// Sample k's location from the exact one: quantised once, then clamped to the box, for it never wraps round.
+/// Sample k's location: quantised once, then clamped to the box, so that it never wraps.
 template <class W>
 HWY_INLINE W rounded_location(const LocationStage& s, const RayWords<W>& ray, W exact, W k, int axis) {
     const auto a = static_cast<std::size_t>(axis);
@@ -58,7 +58,7 @@ HWY_INLINE W locate(const LocationStage& s, const RayWords<W>& ray, W k, int axi
     return rounded_location(s, ray, exact_location(s, ray, k, axis), k, axis);
 }
 
-/// One voxel on from a location along an axis, ahead or back; held inside the box.
+/// One voxel ahead of or behind a location along an axis, clamped to the box.
 template <class W>
 HWY_INLINE W beside(const LocationStage& s, W location, int axis, bool ahead) {
     const W voxel = constant<W>(std::int64_t{1} << s.location_fraction);
@@ -66,7 +66,7 @@ HWY_INLINE W beside(const LocationStage& s, W location, int axis, bool ahead) {
     return ahead ? min(location, limit - voxel) + voxel : max(location, voxel) - voxel;
 }
 
-/// The cell around a location and the weights of its upper corners; at the far face the last cell with a
+/// The cell around a location, and the weights of its upper corners; at the far face the last cell, with a
 /// weight of one.
 template <class W>
 HWY_INLINE CellPosition<W> cell_position(const LocationStage& s, const std::array<W, 3>& location) {

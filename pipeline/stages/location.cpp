@@ -41,7 +41,7 @@ LocationStage build_location(const StageInputs& in) {
     s.location = in.specs[Wire::location], s.direction = in.specs[Wire::direction],
     s.length = in.specs[Wire::length];
     if (in.scene.sampling.position == PositionRule::accumulate) {
-        // Adding V again and again in the location's format is P0 + k q(V): the same integers.
+        // Repeatedly adding V in the location's format gives P0 + k q(V): the same integers.
         s.direction.format.fraction_bits = s.location.format.fraction_bits;
     }
     s.location_fraction = s.location.format.fraction_bits;
@@ -53,8 +53,8 @@ LocationStage build_location(const StageInputs& in) {
     s.to_first = Rescale(s.location_fraction, s.location, wire_index(Wire::location));
     s.to_direction = Rescale(s.direction_fraction, s.direction, wire_index(Wire::direction));
     s.to_length = rescale(in, s.length_fraction, Wire::length);
-    // Dropping less than a last bit of V moves sample k by less than k of them, and P0 has lost its own: so
-    // far can P0 + kV leave the box.
+    // Dropping less than a last bit of V moves sample k by less than k last bits, and P0 is rounded, too: P0
+    // + kV can leave the box by that much.
     const auto drift =
         (static_cast<std::int64_t>(in.most_steps + 4) << (s.common_fraction - s.direction_fraction)) +
         (std::int64_t{1} << (s.common_fraction - s.location_fraction));

@@ -16,7 +16,7 @@ std::vector<WireFormats> every_wire(const PresetInputs& in) {
     return all;
 }
 
-// A preset's member of WireFormats; null if the name is unknown.
+// The member of WireFormats for a preset; null if the name is unknown.
 Spec WireFormats::*preset_member(std::string_view name) {
     if (name == "default") return &WireFormats::standard;
     if (name == "squeeze") return &WireFormats::squeeze;

@@ -1,5 +1,5 @@
-// What stage 1 is given: rays in doubles, before any precision is applied, and their words.  Over a real word
-// D (core/rays-inl.h): one ray, or as many as a vector register holds.
+// Sets up rays for stage 1: in doubles, before any rounding, then as words.  Over a real word D
+// (core/rays-inl.h): one ray, or as many as a vector holds.
 #if defined(SQUINT_PIPELINE_STAGES_RAY_SETUP_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SQUINT_PIPELINE_STAGES_RAY_SETUP_INL_H
 #undef SQUINT_PIPELINE_STAGES_RAY_SETUP_INL_H
@@ -30,9 +30,9 @@ HWY_INLINE RaySetupOf<D> set_up_ray(const Plan& plan, D column, D row) {
     const IntervalOf<D> inside = intersect_box(ray, plan.box_low, plan.box_high);
     const D step_world(plan.step_world);
     const D steps = (inside.last - inside.first) / Divisor(plan.step_world);
-    // A chord of n steps is n slabs: 2^-30 steps forgive the rounding of the chord itself.
+    // A chord of n steps is n slabs: 2^-30 of a step forgives the rounding of the chord itself.
     const D whole = greater(D(1), ceiling(steps - D(0x1p-30)));
-    // Samples of PC's mid-point rule stand in the middle of slabs.
+    // Samples of PC's mid-point rule lie in the middle of slabs.
     const bool middle = plan.scene.classification.method == Method::pc_mid && !plan.projection_mode;
 
     const auto hit = inside.first < inside.last;
@@ -64,7 +64,7 @@ HWY_INLINE RaySetupOf<D> set_up_ray(const Plan& plan, D column, D row) {
 
 // ------------------------------------------------------------------------------------------- words
 
-/// A set-up value to a word: rounded by its wire, or (Real, inactive) exact.
+/// A set-up value as a word: rounded by its wire, or (Real, inactive) exact.
 template <class W>
 W word_from(double value, const Spec& spec, const Rescale& to) {
     return constant<W>(quantise_real(value, static_cast<double>(spec.format.one()), to));
@@ -87,7 +87,7 @@ requires std::same_as<W, Audited> W word_from(double value, const Spec& spec, co
     return record(raw, static_cast<double>(raw) != exact, exact, free);
 }
 
-/// Lanes' words stand in doubles until all of a ray are there: whole numbers of 32 bits.
+/// Lanes hold words as doubles until all of a ray are there: integers of 32 bits.
 HWY_INLINE Reals make_word(WordTag<Reals>, std::int64_t value) {
     return Reals(static_cast<double>(value));
 }
@@ -98,7 +98,7 @@ template <class W>
 HWY_INLINE W bounded(W x, W low, W high) {
     return clamp(x, low, high);
 }
-/// quantise_real's, for formats of at most 31 bits and a sign.
+/// quantise_real() for formats of at most 31 bits and a sign.
 template <class W>
 requires std::same_as<W, Reals> HWY_INLINE Reals word_from(Reals value, const Spec& spec, const Rescale& to) {
     namespace hn = hwy::HWY_NAMESPACE;

@@ -21,19 +21,19 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
-/// A model of reflection: from a normal, and how far it is to be trusted, to a Reflection.
+/// A reflection model: from a normal, and the confidence in it, to a Reflection.
 template <class M, class W>
 concept ReflectionModel = requires(const M& model, const ShadingStage& stage, const RayWords<W>& ray,
                                    const std::array<W, 3>& normal, W confidence) {
     { reflect(model, stage, ray, normal, confidence) } -> std::same_as<Reflection<W>>;
-    { M::kHeldToOpacity } -> std::convertible_to<bool>;  // whether lit light is no more than the opacity
+    { M::kHeldToOpacity } -> std::convertible_to<bool>;  // lit light never exceeds the opacity
 };
 
 template <class... M>
 concept ReflectionModels = (ReflectionModel<M, std::int64_t> && ...);
 static_assert(ReflectionModels<Phong, BlinnPhong, Cone, Gooch>);
 
-/// Calls f with the model's own type: the one list of models.
+/// Calls f with the type of the model: the one list of models.
 template <class F>
 HWY_INLINE decltype(auto) with_model(ShadingModel model, F&& f) {
     switch (model) {
@@ -48,8 +48,8 @@ HWY_INLINE decltype(auto) with_model(ShadingModel model, F&& f) {
     }
 }
 
-/// Lights a slab: `color`, straight or premultiplied, comes back lit.  A zero normal gets ambient light only.
-/// `confidence` is read where the stage fades.
+/// Lights a slab: returns `color`, straight or premultiplied, lit.  A zero normal gets only ambient light.
+/// Reads `confidence` where light fades in.
 template <class W>
 HWY_INLINE void shade(const ShadingStage& s, const RayWords<W>& ray, const std::array<W, 3>& normal, W alpha,
                       std::array<W, 3>& color, W confidence = constant<W>(0)) {

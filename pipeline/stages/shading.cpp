@@ -94,7 +94,7 @@ ShadingStage build_shading(const StageInputs& in) {
             fmt::format("shading.exponent: {} is not a power of two, which shading.power = \"squaring\" "
                         "needs; use {} or power = \"table\"",
                         settings.exponent, std::ldexp(1.0, s.squarings)));
-    // (p + 1) / 2: a whole exponent needs one fraction bit; another gets what 31 bits leave, 20 more at most.
+    // (p + 1) / 2: an integer p needs one fraction bit; others get what 31 bits leave, at most 20.
     const int slope_bits = settings.exponent == std::floor(settings.exponent)
                                ? 1
                                : std::min(21, 32 - bits_for(settings.exponent + 2));
@@ -103,7 +103,7 @@ ShadingStage build_shading(const StageInputs& in) {
     s.parabola_slope = static_cast<std::int64_t>(std::floor(std::ldexp(slope, slope_bits) + 0.5));
     s.power_table_bits = std::min(10, s.power_fraction);
     if (settings.power == PowerRule::table) {
-        // 1024 rows, linear between them: error p^2 / 8 / 2^20 for exponent p.
+        // 1024 rows, linear between them: the error is p^2 / 8 / 2^20 for exponent p.
         const int rows = 1 << s.power_table_bits;
         s.power_table = Table(rows + 1, 1);
         for (int i = 0; i <= rows; ++i)

@@ -1,5 +1,5 @@
-// Stage 5: shading.  slab colour (1.F), opacity (1.F), normal (s1.F) -> lit colour (1.F).
-// Phong and Blinn-Phong, Squeeze equations 10 and 11 as docs/conventions.md#light defines them:
+// Stage 5: shading.  Slab colour (1.F), opacity (1.F), normal (s1.F) -> lit colour (1.F).
+// Phong and Blinn-Phong: Squeeze, equations 10 and 11, as docs/conventions.md#light defines them:
 //
 //     C = alpha (c (ka + kd sum max(0, N.L)) + ks sum max(0, N.H)^p)
 #pragma once
@@ -14,7 +14,7 @@ namespace squint {
 
 struct StageInputs;
 
-/// Models of shading, a file each below shading/; shading-inl.h lists them.
+/// Shading models.  Each is a file in shading/; shading-inl.h lists them.
 struct Phong {
     static constexpr bool kHeldToOpacity = false;
 };
@@ -28,8 +28,8 @@ struct Gooch {
     static constexpr bool kHeldToOpacity = true;
 };
 
-/// What Gooch's model has of its own, first of the cool side, then of the warm one; raw in the material
-/// format, and exact.
+/// Constants of Gooch's model, for the cool side and the warm one: raw in the material format, and
+/// exact.
 struct GoochTones {
     bool cool_to_light = false;
     std::array<std::int64_t, 2> share{};  // of the matter's colour
@@ -43,12 +43,12 @@ struct ShadingStage {
     ShadingModel model = ShadingModel::none;
     PowerRule power = PowerRule::squaring;
     int lights = 0;
-    bool premultiplied = false;  // the slab's colour is; then alpha weighs the highlight too
-    int color_fraction = 0;      // of the slab's colour, and of alpha where premultiplied
-    bool white = true;           // every light is white: one sum serves all three colours
+    bool premultiplied = false;  // of the slab's colour; then alpha weighs the highlight, too
+    int color_fraction = 0;      // of the slab's colour, and of alpha if premultiplied
+    bool white = true;           // every light is white, so one sum serves all three colours
     bool two_sided = false;
-    bool fades = false;         // confidence weighs what the lights add to ambient light
-    bool half_per_ray = false;  // perspective, or Phong's reflected view: the words come with the ray
+    bool fades = false;         // confidence weighs what lights add to ambient light
+    bool half_per_ray = false;  // perspective, or Phong's reflected view: words come with each ray
     int light_fraction = 0, normal_fraction = 0, dot_fraction = 0, power_fraction = 0, intensity_fraction = 0,
         material_fraction = 0;
     std::array<std::array<std::int64_t, 3>, kMostLights> light{}, half{},
@@ -60,7 +60,7 @@ struct ShadingStage {
     bool active = true;  // Real: constants rounded or exact
     double exponent = 1;
     int squarings = 0;
-    std::int64_t parabola_slope = 0;  // 2 (exponent + 1) / 2: keeps the lobe's energy; one fraction bit
+    std::int64_t parabola_slope = 0;  // 2 times (exponent + 1) / 2: keeps the lobe's energy; one fraction bit
     Table power_table;                // power rule `table`: 2^b + 1 rows over the dot's range
     int power_table_bits = 0;
     GoochTones gooch;
@@ -78,11 +78,11 @@ struct ShadingStage {
             v(*r);
         v(gooch.to_faded), v(gooch.to_side), v(power_table);
     }
-    /// Whether words of its own come with each ray.
+    /// Whether each ray has words of its own.
     bool needs_ray() const { return half_per_ray || model == ShadingModel::phong; }
 };
-/// The stage's constants.  Throws InputError for an exponent that its power rule cannot have, and where a wire is unsigned
-/// and the scene is lit.
+/// Builds the stage's constants.  Throws InputError for an exponent that its power rule cannot have, and for
+/// an unsigned wire in a lit scene.
 ShadingStage build_shading(const StageInputs& in);
 
 }  // namespace squint

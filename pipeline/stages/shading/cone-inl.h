@@ -1,5 +1,5 @@
-// Cone: the highlight is max(0, 1 - n (1 - N.H)), which Guetat et al. 2010 write for (N.H)^p: the paper's n = p,
-// or n = (p + 1) / 2, which keeps the lobe's energy.  Compiled once per SIMD target.
+// Cone: the highlight is max(0, 1 - n (1 - N.H)), by Guetat et al. 2010 in place of (N.H)^p: with their n =
+// p, or n = (p + 1) / 2, which keeps the lobe's energy.  Compiled once per SIMD target.
 #if defined(SQUINT_PIPELINE_STAGES_SHADING_CONE_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SQUINT_PIPELINE_STAGES_SHADING_CONE_INL_H
 #undef SQUINT_PIPELINE_STAGES_SHADING_CONE_INL_H

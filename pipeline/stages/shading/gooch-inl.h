@@ -1,6 +1,6 @@
-// Gooch: from a cool to a warm tone as a surface turns to the light, no side of it dark (Guetat et al. 2010,
-// equation 11, with the part that does not depend on N.L).  Of several lights the sum of N.L, held in [-1, 1].
-// Compiled once per SIMD target.
+// Gooch: from a cool to a warm tone as a surface turns to the light; no side is dark (Guetat et al. 2010,
+// equation 11, with the part that does not depend on N.L).  Several lights: the sum of N.L, clamped to [-1,
+// 1]. Compiled once per SIMD target.
 #if defined(SQUINT_PIPELINE_STAGES_SHADING_GOOCH_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SQUINT_PIPELINE_STAGES_SHADING_GOOCH_INL_H
 #undef SQUINT_PIPELINE_STAGES_SHADING_GOOCH_INL_H

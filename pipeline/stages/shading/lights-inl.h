@@ -1,5 +1,5 @@
-// What the models of shading share: N.L, powers, and lights that add up to what matter reflects.  Compiled once
-// per SIMD target.
+// Shared by shading models: N.L, powers, and the sums of lights that matter reflects.  Compiled once per SIMD
+// target.
 #if defined(SQUINT_PIPELINE_STAGES_SHADING_LIGHTS_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SQUINT_PIPELINE_STAGES_SHADING_LIGHTS_INL_H
 #undef SQUINT_PIPELINE_STAGES_SHADING_LIGHTS_INL_H
@@ -17,20 +17,20 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
-/// What a model makes of the lights: matter of colour c shines with c * diffuse + specular.
+/// The result of a model: matter of colour c shines with c * diffuse + specular.
 template <class W>
 struct Reflection {
     std::array<W, 3> diffuse, specular;
-    bool white = false;  // the first of three stands for all
+    bool white = false;  // the first of three holds for all
 };
 
-/// N.V of two unit vectors: exact sum of three products, quantised once; clamped to [0, 1] by the caller.
+/// N.V of two unit vectors: an exact sum of three products, quantised once; the caller clamps it to [0, 1].
 template <class W>
 HWY_INLINE W dot(const std::array<W, 3>& a, const std::array<W, 3>& b, const Rescale& to) {
     return quantise(a[0] * b[0] + a[1] * b[1] + a[2] * b[2], to);
 }
 
-/// Knittel's parabola in the angle, a cone in the cosine: max(0, 1 - slope (1 - x)).
+/// Knittel's parabola in the angle, which is a cone in the cosine: max(0, 1 - slope (1 - x)).
 template <class W>
 HWY_INLINE W cone_of(const ShadingStage& s, W x) {
     const W zero = constant<W>(0), one = constant<W>(std::int64_t{1} << s.power_fraction);
@@ -47,7 +47,7 @@ HWY_INLINE W power(const ShadingStage& s, W x) {
         return x;
     }
     if (s.power == PowerRule::parabola) return cone_of(s, x);
-    const int fraction = s.power_fraction - s.power_table_bits;  // a table, linear between its rows
+    const int fraction = s.power_fraction - s.power_table_bits;  // a table, linear between rows
     const W row = min(floor_shift(x, fraction), constant<W>((std::int64_t{1} << s.power_table_bits) - 1));
     const W rest = within(x - shift_left(row, fraction), 0, std::int64_t{1} << fraction);
     return quantise(
@@ -55,7 +55,7 @@ HWY_INLINE W power(const ShadingStage& s, W x) {
         s.to_power_lerp);
 }
 
-/// Without rounding a table is the power itself.
+/// Without rounding the power itself replaces a table.
 inline Real<double> power(const ShadingStage& s, Real<double> x) {
     if (s.power != PowerRule::table || s.power_table.active) return power<Real<double>>(s, x);
     const double one = power_of_two<double>(s.power_fraction);
@@ -73,7 +73,7 @@ HWY_INLINE std::array<W, 3> light_vector(const ShadingStage& s, std::size_t l) {
             stage_constant<W>(s.light[l][a], s.light_exact[l][a], s.light_fraction, s.active, Wire::light);
     return light;
 }
-/// H: halfway between a light and the eye.
+/// The half vector H between a light and the eye.
 template <class W>
 HWY_INLINE std::array<W, 3> half_vector(const ShadingStage& s, const RayWords<W>& ray, std::size_t l) {
     if (s.half_per_ray) return ray.half[l];
@@ -84,7 +84,7 @@ HWY_INLINE std::array<W, 3> half_vector(const ShadingStage& s, const RayWords<W>
     return half;
 }
 
-/// N.H in [0, 1], of either side where both are lit.
+/// N.H in [0, 1]; |N.H| where both sides are lit.
 template <class W>
 HWY_INLINE W towards_half(const ShadingStage& s, const RayWords<W>& ray, const std::array<W, 3>& normal,
                           std::size_t l) {
@@ -93,7 +93,7 @@ HWY_INLINE W towards_half(const ShadingStage& s, const RayWords<W>& ray, const s
                  constant<W>(std::int64_t{1} << s.dot_fraction));
 }
 
-/// ka + kd sum max(0, N.L), and ks times the sum of highlights: `highlight(l, light, facing)` of each light.
+/// ka + kd sum max(0, N.L), and ks sum of `highlight(l, light, facing)` over the lights.
 template <class W, class Highlight>
 HWY_INLINE Reflection<W> lights_that_add_up(const ShadingStage& s, const std::array<W, 3>& normal,
                                             W confidence, const Highlight& highlight) {

@@ -25,7 +25,7 @@ HWY_INLINE Reflection<W> reflect(Phong, const ShadingStage& s, const RayWords<W>
             const W light_view = dot(light, ray.view, s.to_light_view);
             const W mirrored = quantise(
                 shift_left(facing * towards_eye, 1) - shift_left(light_view, s.dot_fraction), s.to_reflected);
-            // No reflection where no light falls; R is the same for both sides of a surface.
+            // Where no light falls nothing is reflected; R is the same for both sides of a surface.
             const auto dark = s.two_sided ? facing == zero : !(zero < facing);
             return power(s, clamp(select(dark, zero, mirrored), zero, one));
         });
