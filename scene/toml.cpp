@@ -74,11 +74,11 @@ TomlValue from_node(const toml::node& node) {
         value.flag = flag->get();
     } else {
         value.kind = Kind::date;
-        std::ostringstream text;
-        if (const auto* date = node.as_date()) text << date->get();
-        if (const auto* time = node.as_time()) text << time->get();
-        if (const auto* both = node.as_date_time()) text << both->get();
-        value.text = text.str();
+        std::ostringstream written;
+        if (const auto* date = node.as_date()) written << date->get();
+        if (const auto* time = node.as_time()) written << time->get();
+        if (const auto* both = node.as_date_time()) written << both->get();
+        value.text = written.str();
     }
     return value;
 }

@@ -22,7 +22,7 @@ Rescale limits_of(const StageInputs& in, Wire wire) {
 }
 
 int bits_for(double value) {
-    return value < 1 ? 0 : std::bit_width(static_cast<std::uint64_t>(std::floor(value)));
+    return value < 1 ? 0 : static_cast<int>(std::bit_width(static_cast<std::uint64_t>(std::floor(value))));
 }
 
 void require_integer_bits(const StageInputs& in, Wire wire, int bits, const std::string& what) {

@@ -93,13 +93,13 @@ void build_pi2d_words(const Entries& entries, int size, double length, std::span
         scratch.resize(plane * (4 * sizeof(Word) + 2 * kDiagonalsPerGroup * sizeof(Cell)));
         Cell* const lanes = reinterpret_cast<Cell*>(scratch.data());
         Word* const words = reinterpret_cast<Word*>(lanes + 2 * kDiagonalsPerGroup * plane);
-        const auto pack = [&](auto&& values, std::size_t count, Cell* out) {
+        const auto pack = [&](auto&& values, std::size_t slabs, Cell* out) {
             for (int k = 0; k < 4; ++k)
-                encode(k, std::span(values(k), count), std::span(words + k * plane, count));
+                encode(k, std::span(values(k), slabs), std::span(words + k * plane, slabs));
             if constexpr (sizeof(Word) == 2)
-                interleave_4(words, plane, count, out->word);
+                interleave_4(words, plane, slabs, out->word);
             else
-                for (std::size_t f = 0; f < count; ++f)
+                for (std::size_t f = 0; f < slabs; ++f)
                     out[f] = {{words[f], words[plane + f], words[2 * plane + f], words[3 * plane + f]}};
         };
         for (int lane = 0; lane < count; ++lane) {
