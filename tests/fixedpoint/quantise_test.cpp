@@ -1,5 +1,5 @@
 // quantise() is SystemC's arithmetic: held against a second implementation by exact division, over every
-// small format, mode, shift and value.  (quantise_systemc.cpp holds both against SystemC itself.)
+// small format, mode, shift and value.  (systemc/sc_fix_test.cpp holds both against SystemC itself.)
 #include "fixedpoint/quantise.h"
 
 #include <gtest/gtest.h>
