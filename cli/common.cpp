@@ -3,7 +3,6 @@
 #include "cli/shelf.h"
 #include "core/atomic_file.h"
 #include "core/error.h"
-#include "core/import/kind.h"
 #include "core/procedural.h"
 #include "core/volume_source.h"
 #include "scene/from_data.h"
@@ -36,15 +35,7 @@ void write_json(const std::string& path, const nlohmann::ordered_json& json) {
 }
 
 Scene read(const SceneArguments& arguments) {
-    const auto sets_file = [](const std::string& text) { return text.starts_with("volume.file"); };
-    const bool of_data = arguments.file.empty()
-                             ? std::any_of(arguments.overrides.begin(), arguments.overrides.end(), sets_file)
-                             : !arguments.file.starts_with('@') && looks_like_volume(arguments.file);
-    Scene scene = of_data                  ? scene_with(scene_of_data(arguments.file), arguments.overrides)
-                  : arguments.file.empty() ? scene_with(built_in_scene(), arguments.overrides)
-                                           : read_scene(file_of(arguments.file), arguments.overrides);
-    scene.precision = resolved_precision(scene);
-    return scene;
+    return scene_asked_for(file_of(arguments.file), arguments.overrides);
 }
 
 Scene scene_of_volume(const std::string& name_or_file, const std::vector<std::string>& overrides) {
@@ -73,38 +64,11 @@ std::shared_ptr<const Volume> load_and_complete(Scene& scene, std::vector<std::s
     return volume;
 }
 
-namespace {
-/// The setting that a plan's message is about: the one it begins with, or, for a section, the first that it
-/// names.  Empty if none was given.
-std::string setting_meant(const Scene& scene, const std::string& key, const std::string& message) {
-    if (scene.given_at.contains(key)) return key;
-    std::string meant;
-    std::size_t first = std::string::npos;
-    for (const auto& [given, place] : scene.given_at) {
-        if (!given.starts_with(key + '.')) continue;
-        const std::size_t at = message.find(' ' + given.substr(key.size() + 1) + ' ');
-        if (at < first) first = at, meant = given;
-    }
-    return meant;
-}
-}  // namespace
-
-Plan plan_of(const Scene& scene, std::shared_ptr<const Volume> volume, int frame) {
-    try {
-        return make_plan(scene, std::move(volume), frame);
-    } catch (const InputError& error) {
-        const std::string message = error.what(), key = message.substr(0, message.find(':'));
-        const auto given = setting_meant(scene, key, message);
-        if (given.empty()) throw;
-        throw InputError(where(scene, given) + message.substr(key.size()));
-    }
-}
-
 Plan plan_of(const SceneArguments& arguments) {
     Scene scene = read(arguments);
     std::vector<std::string> notes;
     const auto volume = load_and_complete(scene, notes);
-    Plan plan = plan_of(scene, volume);
+    Plan plan = plan_asked_for(scene, volume);
     plan.notes.insert(plan.notes.begin(), notes.begin(), notes.end());
     return plan;
 }

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "cli/arguments.h"
-#include "pipeline/plan/plan.h"
+#include "pipeline/plan/asked.h"
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -24,8 +24,8 @@ void print_json(const nlohmann::ordered_json& json);
 /// Writes to a file, whole or not at all, or to standard output for -.
 void write_json(const std::string& path, const nlohmann::ordered_json& json);
 
-/// The requested scene with its preset file merged in.  A volume in place of a scene, or in place of the
-/// built-in head, makes a scene of its own; its transfer function may be missing until load().
+/// scene_asked_for(), and @NAME means a scene that comes with squint; its transfer function may be missing until
+/// load_and_complete().
 Scene read(const SceneArguments& arguments);
 
 /// A scene whose volume is NAME (procedural) or a file, with `volume.*` overrides.
@@ -40,10 +40,7 @@ std::shared_ptr<const Volume> load_and_complete(Scene& scene, std::vector<std::s
 std::shared_ptr<const Volume> load(const Scene& scene, std::vector<std::string>& notes,
                                    std::int64_t max_bytes = 0);
 
-/// make_plan(); its messages begin with the place of the setting that they are about.
-Plan plan_of(const Scene& scene, std::shared_ptr<const Volume> volume, int frame = 0);
-
-/// Scene, volume and plan in one step; the volume's notes come before the plan's.
+/// Scene, volume and plan_asked_for() in one step; the volume's notes come before the plan's.
 Plan plan_of(const SceneArguments& arguments);
 
 /// "12.3 MiB", "4.1 M".

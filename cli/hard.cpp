@@ -64,7 +64,7 @@ Outcome outcome_of(Scene scene, const NamedMethod& method, const std::shared_ptr
     scene.classification.method = method.method, scene.classification.order = method.order;
     Outcome outcome;
     try {
-        const Plan plan = plan_of(scene, volume);
+        const Plan plan = plan_asked_for(scene, volume);
         outcome.check = check_slabs(plan), outcome.notes = plan.notes;
     } catch (const InputError& error) {
         outcome.refused = error.what();

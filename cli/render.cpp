@@ -171,26 +171,10 @@ void write_reference(const Job& job, const Plan& plan, const Image& reference, i
               attributes);
 }
 
-/// Says that a picture shows nothing, where the plan has found no reason.
-std::vector<std::string> warnings_of(const Plan& plan, const Rendering& rendering) {
-    std::vector<std::string> warnings = plan.warnings;
-    const std::vector<float>& alpha = rendering.image.find("A")->values;
-    const auto empty = [](const std::string& warning) {
-        return warning.find("the picture is empty") != std::string::npos;
-    };
-    if (std::none_of(alpha.begin(), alpha.end(), [](float a) { return a > 0; }) &&
-        std::none_of(warnings.begin(), warnings.end(), empty))
-        warnings.push_back(rendering.statistics.rays == 0
-                               ? "the picture is empty: no ray meets the volume; see camera and clip"
-                               : "the picture is empty: no sample on its rays has an opacity above 0; see "
-                                 "transfer_function, clip and camera");
-    return warnings;
-}
-
 /// Renders, writes and reports one picture; returns its record.
 Json render_frame(const Job& job, int frame) {
     const RenderArguments& a = job.arguments;
-    const Plan plan = plan_of(job.scene, job.volume, frame);
+    const Plan plan = plan_asked_for(job.scene, job.volume, frame);
     const RenderStatistics nothing;
     const std::int64_t needed = memory_of(plan, nothing).total();
     refuse_beyond(a.max_memory, needed, "the scene");

@@ -163,6 +163,21 @@ Comparison compare_colors(const Image& picture, const Image& other) {
     return compare(colors_of(picture), colors_of(other));
 }
 
+std::vector<std::string> warnings_of(const Plan& plan, const Rendering& rendering) {
+    std::vector<std::string> warnings = plan.warnings;
+    const std::vector<float>& alpha = rendering.image.find("A")->values;
+    const auto empty = [](const std::string& warning) {
+        return warning.find("the picture is empty") != std::string::npos;
+    };
+    if (std::none_of(alpha.begin(), alpha.end(), [](float a) { return a > 0; }) &&
+        std::none_of(warnings.begin(), warnings.end(), empty))
+        warnings.push_back(rendering.statistics.rays == 0
+                               ? "the picture is empty: no ray meets the volume; see camera and clip"
+                               : "the picture is empty: no sample on its rays has an opacity above 0; see "
+                                 "transfer_function, clip and camera");
+    return warnings;
+}
+
 // ------------------------------------------------------------------------------------------------ JSON
 
 Json json_of(const Difference& d) {

@@ -59,6 +59,9 @@ Errors rounding_errors(const Plan& plan, const Image& picture, const RenderOptio
 /// Compares R, G, B and A of two pictures of one scene.
 Comparison compare_colors(const Image& picture, const Image& other);
 
+/// The plan's warnings, and one that the picture shows nothing, where the plan has found no reason.
+std::vector<std::string> warnings_of(const Plan& plan, const Rendering& rendering);
+
 // Parts of `--json`; docs/json.md has the schema.
 nlohmann::ordered_json json_of(const Difference& difference);
 nlohmann::ordered_json json_of(const Comparison& comparison);

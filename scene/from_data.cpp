@@ -1,5 +1,7 @@
 #include "scene/from_data.h"
 
+#include "core/import/kind.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -110,6 +112,17 @@ TransferFunctionSettings histogram_function(const Volume& volume, const Levels& 
 }
 
 }  // namespace
+
+Scene scene_asked_for(const std::string& file, const std::vector<std::string>& overrides) {
+    const auto sets_file = [](const std::string& text) { return text.starts_with("volume.file"); };
+    const bool of_data =
+        file.empty() ? std::any_of(overrides.begin(), overrides.end(), sets_file) : looks_like_volume(file);
+    Scene scene = of_data        ? scene_with(scene_of_data(file), overrides)
+                  : file.empty() ? scene_with(built_in_scene(), overrides)
+                                 : read_scene(file, overrides);
+    scene.precision = resolved_precision(scene);
+    return scene;
+}
 
 Scene scene_of_data(const std::string& file) {
     Scene scene;

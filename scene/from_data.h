@@ -8,6 +8,11 @@
 
 namespace squint {
 
+/// The scene that a user asked for.  `file` is a scene, or a volume, which makes a scene of its own, or empty: the
+/// built-in scene, or, where `overrides` (key=value) set volume.file, one that this volume makes.  The preset file is
+/// merged in.  A scene that a volume makes has no transfer function until complete_from_data().  Throws InputError.
+Scene scene_asked_for(const std::string& file, const std::vector<std::string>& overrides);
+
 /// A scene without a transfer function for the volume in `file`: a headlight, the first-order power series of
 /// pre-integration (pips), and a camera that shows the whole volume.
 Scene scene_of_data(const std::string& file);

@@ -4,6 +4,7 @@
 #include "core/import/axes.h"
 #include "core/import/handover.h"
 #include "core/import/stored_bytes.h"
+#include "core/module_file.h"
 #include "core/text.h"
 
 #include <fcntl.h>
@@ -157,8 +158,8 @@ std::shared_ptr<unsigned char> take_voxels(int voxels, std::size_t size, const s
 std::string reader_program() {
     constexpr const char* kName = "squint-read";
     if (const char* named = std::getenv("SQUINT_READ"); named != nullptr && *named != '\0') return named;
-    std::error_code error;
-    const fs::path beside = fs::read_symlink("/proc/self/exe", error).parent_path();
+    // Beside the program, or beside the module that another's program (Python) has loaded.
+    const fs::path beside = fs::path(module_file()).parent_path();
     for (const fs::path& folder : {beside, beside / "../libexec/squint", fs::path(SQUINT_LIBEXEC)})
         if (access((folder / kName).c_str(), X_OK) == 0) return (folder / kName).string();
     return {};

@@ -1,0 +1,30 @@
+// What a plan says of itself, for `squint plan` and records.
+#pragma once
+
+#include "pipeline/plan/plan.h"
+
+#include <nlohmann/json_fwd.hpp>
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace squint {
+
+/// Every table of the plan, as the plan reports them, or else as its stages hold them.
+std::vector<TableReport> tables_of(const Plan& plan);
+
+/// The bits of the lanes that run plan.stages[stage]; none where the model runs it.
+std::optional<int> lane_bits(const Plan& plan, std::size_t stage);
+
+/// How the scene will be rendered ("lanes" or "model") and why, as `squint render` reports it.
+struct PathOf {
+    std::string path, why;
+};
+PathOf path_of(const Plan& plan);
+
+/// The schema squint.plan/2 (docs/json.md).
+nlohmann::ordered_json json_of_plan(const Plan& plan);
+
+}  // namespace squint
