@@ -1,6 +1,7 @@
 #include "studies/sweep/answer.h"
 
 #include "fixedpoint/format.h"
+#include "studies/sweep/together.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -8,7 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,6 +24,10 @@ std::string label_of(const Json& entry) {
     std::string text;
     for (const auto& [axis, value] : entry["values"].items()) {
         std::string name = axis;
+        if (axis == kTogether) {  // says itself what it is
+            text += (text.empty() ? "" : ", ") + value.get<std::string>();
+            continue;
+        }
         for (const char* part : {" fraction_bits", " integer_bits"})
             if (name.ends_with(part))
                 name.replace(name.size() - std::strlen(part), std::string::npos,
@@ -42,21 +47,53 @@ std::string saving_text(double percent) {
     return fmt::format("{:.3g} % {} bits than", std::abs(percent), percent >= 0 ? "fewer" : "more");
 }
 
-/// The widest wire of those that `counts` accepts.
-void find_widest(const Json& wires, Json& answer, const std::function<bool(const std::string&)>& counts) {
-    int widest = 0;
-    for (const auto& [wire, spec] : wires.items()) {
-        if (!counts(wire)) continue;
-        Format format;
-        const std::string text = spec.is_string() ? spec.get<std::string>() : "";
-        if (!parse_format(text.substr(0, text.find(' ')), format).empty() || format.width() <= widest)
-            continue;
-        widest = format.width();
-        answer["wire"] = wire, answer["format"] = to_string(format);
+int width_of(const Json& point, const std::string& wire) {
+    const std::string spec = point["wires"].value(wire, "");
+    Format format;
+    return parse_format(spec.substr(0, spec.find(' ')), format).empty() ? format.width() : 0;
+}
+
+/// Sets answer["wire"], ["format"] and ["bits_a_bit"] to the wire whose bits cost most at `point`, among those that
+/// the sweep varies alone.  A bit of a wire costs what the bits of a point rise by between the wire's narrowest and
+/// widest format, divided by the difference of their widths.
+void find_dearest_wire(const Json& data, const Json& point, Json& answer) {
+    struct Ends {
+        int narrow = 0, wide = 0;
+        double least = 0, most = 0;  // bits of those points
+    };
+    std::map<std::string, Ends> wires;
+    for (const Json& entry : data["entries"]) {
+        const Json& at = data["points"][entry["point"].get<std::size_t>()];
+        const std::string varied = entry.value("varied", "");
+        if (!varied.ends_with("_bits") && !varied.ends_with("_offset")) continue;
+        const std::string wire = varied.substr(0, varied.find(' '));
+        const int width = at["status"] == "done" ? width_of(at, wire) : 0;
+        if (width == 0 || varied.find(' ') != varied.rfind(' ')) continue;  // "all wires fraction_bits"
+        const double bits = at["cost"]["bits"];
+        Ends& ends = wires.try_emplace(wire, Ends{width, width, bits, bits}).first->second;
+        if (width < ends.narrow) ends.narrow = width, ends.least = bits;
+        if (width > ends.wide) ends.wide = width, ends.most = bits;
+    }
+    double dearest = 0;
+    for (const auto& [wire, ends] : wires) {
+        if (ends.wide == ends.narrow) continue;
+        const double a_bit = (ends.most - ends.least) / (ends.wide - ends.narrow);
+        const int width = width_of(point, wire);
+        if (a_bit * width <= dearest) continue;
+        dearest = a_bit * width;
+        answer["wire"] = wire, answer["bits_a_bit"] = a_bit;
+        answer["format"] = point["wires"][wire];
     }
 }
 
-Json answer_of_search(const Json& search) {
+/// "weight (u1.8 trn sat): each of its bits costs 530"
+std::string dearest_text(const Json& answer) {
+    return fmt::format("{} ({}): each of its bits costs {:.3g}", answer["wire"].get<std::string>(),
+                       answer["format"].get<std::string>(), answer["bits_a_bit"].get<double>());
+}
+
+Json answer_of_search(const Json& data) {
+    const Json& search = data["search"];
     const Json &found = search["found"], &squeeze = search["squeeze"], &scene = search["scene"];
     const double bits = found["bits"], bound = search["max_error_lsb8"];
     Json answer{{"bound", bound},
@@ -68,7 +105,7 @@ Json answer_of_search(const Json& search) {
                 {"than_bits", scene["bits"]},
                 {"saving_percent", 100 * (1 - bits / scene["bits"].get<double>())},
                 {"unseen_margin", found["other_views_margin_lsb8"]}};
-    find_widest(found["wires"], answer, [](const std::string&) { return true; });
+    find_dearest_wire(data, found, answer);
     const bool kept = !found["error_lsb8"].is_null() && found["error_lsb8"].get<double>() <= bound;
     const Json& margin = answer["unseen_margin"];
     answer["good"] = kept && !margin.is_null() && margin.get<double>() >= 0;
@@ -84,8 +121,7 @@ Json answer_of_search(const Json& search) {
         saving_text(100 * (1 - bits / squeeze["bits"].get<double>())), count(squeeze["bits"]),
         error(squeeze));
     if (answer.contains("wire"))
-        text += fmt::format(" The widest wire is {} ({}).", answer["wire"].get<std::string>(),
-                            answer["format"].get<std::string>());
+        text += fmt::format(" The wire that costs most is {}.", dearest_text(answer));
     if (margin.is_null())
         text += " Views that took no part were not measured.";
     else
@@ -152,17 +188,13 @@ Json answer_of_sweep(const Json& data, double bound) {
             for (const Json& part : bits) sum += part.is_number() ? part.get<double>() : 0;
             if (sum > most) most = sum, answer["stage"] = stage, answer["stage_bits"] = sum;
         }
-    // Only wires that the sweep varies: others are as wide as somebody left them.
-    find_widest(point["wires"], answer, [&](const std::string& wire) {
-        return std::any_of(data["entries"].begin(), data["entries"].end(), [&](const Json& entry) {
-            return entry.contains("varied") && entry["varied"].get<std::string>().starts_with(wire + " ");
-        });
-    });
+    find_dearest_wire(data, point, answer);
     if (answer.contains("stage"))
         text += fmt::format(" Most of them are in {} ({})", answer["stage"].get<std::string>(), count(most));
     if (answer.contains("wire"))
-        text += fmt::format("{} the widest wire is {} ({})", answer.contains("stage") ? ";" : "",
-                            answer["wire"].get<std::string>(), answer["format"].get<std::string>());
+        text +=
+            (answer.contains("stage") ? "; the wire that costs most is " : " The wire that costs most is ") +
+            dearest_text(answer);
     answer["text"] = text + (answer.contains("stage") || answer.contains("wire") ? "." : "");
     return answer;
 }
@@ -170,7 +202,7 @@ Json answer_of_sweep(const Json& data, double bound) {
 }  // namespace
 
 Json answer_of(const Json& data, double bound) {
-    Json answer = data.contains("search") ? answer_of_search(data["search"]) : answer_of_sweep(data, bound);
+    Json answer = data.contains("search") ? answer_of_search(data) : answer_of_sweep(data, bound);
     const auto unmeasured = data["unmeasured"].get<std::vector<std::string>>();
     if (!unmeasured.empty())
         answer["text"] = fmt::format("{} Not measured: {}.", answer["text"].get<std::string>(),

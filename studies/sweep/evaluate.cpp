@@ -4,6 +4,7 @@
 #include "core/compare.h"
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/module_file.h"
 #include "pipeline/machines/lanes/empty_space.h"
 #include "pipeline/machines/model.h"
 #include "pipeline/record.h"
@@ -173,7 +174,7 @@ Spec edited(Spec spec, const WireEdit& edit) {
 
 Json program_record() {
     static const std::string hash = [] {
-        std::ifstream file("/proc/self/exe", std::ios::binary);
+        std::ifstream file(module_file(), std::ios::binary);
         std::ostringstream bytes;
         bytes << file.rdbuf();
         Hasher hasher;
@@ -418,7 +419,7 @@ std::vector<std::string> Evaluator::baseline_keys(const Prepared& point) {
 
 // ----------------------------------------------------------------------------------------- figures
 
-std::vector<std::string> Evaluator::wanted() const {
+std::vector<std::string> Evaluator::wanted(bool base) const {
     const Measure& m = sweep_.measure;
     std::vector<std::string> names;
     if (m.real) names.push_back("real");
@@ -430,7 +431,7 @@ std::vector<std::string> Evaluator::wanted() const {
     }
     if (m.srgb) names.push_back("srgb");
     if (m.ssim) names.push_back("ssim");
-    if (m.audit) names.push_back("audit");
+    if (m.audit.value_or(base)) names.push_back("audit");
     if (m.conservation) names.push_back("conservation");
     if (m.repeats > 0) names.push_back(fmt::format("time of {} by {} threads", m.repeats, m.threads));
     if (m.exr) names.push_back("exr");
@@ -438,7 +439,7 @@ std::vector<std::string> Evaluator::wanted() const {
     return names;
 }
 
-Json Evaluator::measure(const Prepared& point, int threads, bool timed) {
+Json Evaluator::measure(const Prepared& point, int threads, bool timed, bool base) {
     if (!point.failure.empty()) throw InputError(point.failure);
     const Measure& m = sweep_.measure;
     const Plan plan = make_plan(point.scene, point.volume);
@@ -474,7 +475,7 @@ Json Evaluator::measure(const Prepared& point, int threads, bool timed) {
     }
     json["color_above_alpha_lsb8"] = color_above_alpha(colors);
     if (m.conservation) json["conservation"] = conservation(point, options);
-    if (m.audit) {
+    if (m.audit.value_or(base && !plan.real)) {
         RenderOptions audited = options;
         audited.audit = true;
         const Rendering again = render(plan, audited);

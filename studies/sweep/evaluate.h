@@ -48,11 +48,13 @@ class Evaluator {
     std::vector<std::string> baseline_keys(const Prepared& point);
 
     /// Renders, compares and counts; returns the record of a point (docs/sweeps.md, "The record of a point").
-    /// `timed`: alone on the machine, with the sweep's repeats.  Throws InputError and Cancelled.
-    Json measure(const Prepared& point, int threads, bool timed);
+    /// `timed`: alone on the machine, with the sweep's repeats.  `base`: audited unless the sweep says otherwise.
+    /// Throws InputError and Cancelled.
+    Json measure(const Prepared& point, int threads, bool timed, bool base = false);
 
-    /// The names of all that a record of this sweep holds; a record that holds more serves as well.
-    std::vector<std::string> wanted() const;
+    /// The names of all that a record of this sweep, or of a base point, holds; a record that holds more serves as
+    /// well.
+    std::vector<std::string> wanted(bool base = false) const;
 
   private:
     struct BaselineScene {

@@ -123,13 +123,36 @@ constexpr std::array<std::string_view, 3> kMeasurements[] = {
     {"conservation", "C + T", "C + T for white matter (measure.conservation)."},
 };
 
+/// Whether points differ in more than formats: points with one exact picture then have several without rounding.
+bool varies_the_method(const Json& points) {
+    std::set<std::string> real, reference;
+    for (const Json& point : points)
+        if (point.contains("baselines") && point["baselines"].contains("real") &&
+            point["baselines"].contains("reference"))
+            real.insert(point["baselines"]["real"].get<std::string>()),
+                reference.insert(point["baselines"]["reference"].get<std::string>());
+    return real.size() > reference.size();
+}
+
 void add_what_was_not_measured(Json& data, const Json& sweep, const Json& points, std::size_t missing) {
     const auto measured = sweep["measured"].get<std::vector<std::string>>();
     Json &words = data["unmeasured"] = Json::array(), &lines = data["not_measured"] = Json::array();
-    for (const auto& [name, word, line] : kMeasurements)
-        if (std::none_of(measured.begin(), measured.end(),
-                         [name = name](const std::string& m) { return m.starts_with(name); }))
+    const bool audited =
+        std::any_of(points.begin(), points.end(), [](const Json& p) { return p.contains("audit"); });
+    for (const auto& [name, word, line] : kMeasurements) {
+        if (std::any_of(measured.begin(), measured.end(),
+                        [name = name](const std::string& m) { return m.starts_with(name); }))
+            continue;
+        if (name == "audit" && audited)
+            lines.push_back(
+                "Ranges, saturation, wrap and stuck transparency of other points than the base "
+                "(measure.audit).");
+        else
             words.push_back(word), lines.push_back(line);
+    }
+    if (!data.contains("search"))
+        words.push_back("other views"),
+            lines.push_back("Other views than the scene's own: squint search holds some out.");
     lines.push_back(
         "Area and energy of hardware: bits are counted from the formats, by the rules in docs/sweeps.md.");
     if (missing > 0) lines.push_back(fmt::format("{} points have no record yet.", missing));
@@ -357,7 +380,8 @@ Json report_data(const std::string& run, double most_error) {
         entries.push_back(line);
     }
     Json names = Json::array();
-    for (const char* first : {"real", "reference"})
+    const bool method = varies_the_method(points);
+    for (const char* first : {method ? "reference" : "real", method ? "real" : "reference"})
         if (against.erase(first)) names.push_back(first);
     for (const std::string& name : against) names.push_back(name);
     data["against"] = names;

@@ -6,6 +6,7 @@
 #include "scene/toml.h"
 #include "studies/sweep/run_folder.h"
 #include "studies/sweep/side_by_side.h"
+#include "studies/sweep/together.h"
 
 #include <fmt/format.h>
 
@@ -38,6 +39,7 @@ std::vector<ListedPoint> list_points(const SweepFile& sweep, Evaluator& evaluato
         if (cancelled && *cancelled) throw Cancelled{};
         entries[i].hash = evaluator.prepare(points[i]).hash;
         entries[i].point = std::move(points[i]);
+        entries[i].base = sweep.mode == Mode::one_at_a_time ? entries[i].point.varied.empty() : i == 0;
     });
     return entries;
 }
@@ -76,6 +78,7 @@ class Runner {
             }
             write_run("finished");
         }
+        if (add_first_formats_together()) write_list();
         summary_.seconds = seconds_since(begun);
         return summary_;
     }
@@ -129,12 +132,8 @@ class Runner {
 
     void find_missing() {
         entries_ = list_points(sweep_, evaluator_, threads_, options_.cancelled);
-        const std::vector<std::string> wanted = evaluator_.wanted();
-        if (!dry_) {
-            const std::string path = options_.folder + "/sweep.json";
-            const std::string text = dump(sweep_record(sweep_, entries_, wanted));
-            write_text_whole(path, text);
-        }
+        const std::vector<std::string> wanted = evaluator_.wanted(), wanted_of_base = evaluator_.wanted(true);
+        if (!dry_) write_list();
         std::map<std::string, std::size_t> first;
         for (std::size_t i = 0; i < entries_.size(); ++i) first.emplace(entries_[i].hash, i);
         std::vector<std::size_t> mine;
@@ -148,7 +147,8 @@ class Runner {
             of_shard.insert(entries_[i].hash);
             const RecordState state = options_.redo || options_.folder.empty()
                                           ? RecordState::missing
-                                          : state_of(point_path(options_.folder, entries_[i].hash), wanted);
+                                          : state_of(point_path(options_.folder, entries_[i].hash),
+                                                     entries_[i].base ? wanted_of_base : wanted);
             if (state == RecordState::missing)
                 missing_.push_back(i);
             else
@@ -158,6 +158,31 @@ class Runner {
         summary_.points = static_cast<std::size_t>(
             std::count_if(entries_.begin(), entries_.end(),
                           [&](const ListedPoint& e) { return of_shard.contains(e.hash); }));
+    }
+
+    void write_list() const {
+        write_text_whole(options_.folder + "/sweep.json",
+                         dump(sweep_record(sweep_, entries_, evaluator_.wanted())));
+    }
+
+    /// Measures the points of first_formats_together(); returns whether there are any.
+    bool add_first_formats_together() {
+        const bool compared = sweep_.measure.real || sweep_.measure.reference;
+        if (sweep_.mode != Mode::one_at_a_time || !compared || options_.shards > 1) return false;
+        const auto record_of = [&](const std::string& hash) {
+            return read_json(point_path(options_.folder, hash));
+        };
+        const std::vector<Point> points =
+            first_formats_together(entries_, record_of, sweep_.measure.real ? "real" : "reference");
+        for (const Point& point : points) {
+            check_cancelled();
+            const Prepared prepared = evaluator_.prepare(point);
+            const std::string path = point_path(options_.folder, prepared.hash);
+            if (options_.redo || state_of(path, evaluator_.wanted()) == RecordState::missing)
+                write_record(evaluator_, prepared, options_.folder, threads_, sweep_.measure.repeats > 0);
+            entries_.push_back({point, prepared.hash});
+        }
+        return !points.empty();
     }
 
     void make_baselines() {
@@ -188,7 +213,7 @@ class Runner {
             check_cancelled();
             const ListedPoint& entry = entries_[missing_[n]];
             const Json record = write_record(evaluator_, evaluator_.prepare(entry.point), options_.folder,
-                                             timed ? threads_ : 1, timed);
+                                             timed ? threads_ : 1, timed, entry.base);
             const std::lock_guard lock(mutex_);
             ++summary_.computed;
             if (record["status"] == "failed" && summary_.failed++ == 0)

@@ -160,15 +160,15 @@ RecordState state_of(const std::string& path, const std::vector<std::string>& wa
 }
 
 Json write_record(Evaluator& evaluator, const Prepared& point, const std::string& folder, int threads,
-                  bool timed) {
+                  bool timed, bool base) {
     Json record{{"schema", "squint.point/2"}, {"hash", point.hash}};
     record.update(program_record());
     record["scene"] = point.scene_file;
     record["settings"] = settings_record(point.settings);
-    record["measured"] = evaluator.wanted();
+    record["measured"] = evaluator.wanted(base);
     std::string reason;
     try {
-        const Json figures = evaluator.measure(point, threads, timed);
+        const Json figures = evaluator.measure(point, threads, timed, base);
         record["status"] = "done";
         record.update(figures);
     } catch (const InputError& error) {

@@ -27,14 +27,15 @@ enum class RecordState { missing, reusable, other_program };
 RecordState state_of(const std::string& path, const std::vector<std::string>& wanted);
 
 /// Measures a point and writes its record into the evaluator's folder; a point that fails has a record with
-/// the reason.  Throws Cancelled, and InputError where nothing can be written.
+/// the reason.  `base`: see Evaluator::measure().  Throws Cancelled, and InputError where nothing can be written.
 Json write_record(Evaluator& evaluator, const Prepared& point, const std::string& folder, int threads,
-                  bool timed);
+                  bool timed, bool base = false);
 
 /// One point of a sweep: its place in the list, and its name.
 struct ListedPoint {
     Point point;
     std::string hash;
+    bool base = false;  // mode one_at_a_time: the unvaried ones; other modes: the first
 };
 /// The contents of sweep.json: the points in order, each by its hash, and the command.
 Json sweep_record(const SweepFile& sweep, const std::vector<ListedPoint>& entries,

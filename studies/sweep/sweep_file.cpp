@@ -368,10 +368,11 @@ class Reader {
                  "picture_size"});
         Measure& m = sweep_.measure;
         const std::pair<const char*, bool*> flags[] = {
-            {"real", &m.real},   {"reference", &m.reference},       {"srgb", &m.srgb}, {"ssim", &m.ssim},
-            {"audit", &m.audit}, {"conservation", &m.conservation}, {"exr", &m.exr}};
+            {"real", &m.real}, {"reference", &m.reference},       {"srgb", &m.srgb},
+            {"ssim", &m.ssim}, {"conservation", &m.conservation}, {"exr", &m.exr}};
         for (const auto& [name, target] : flags)
             if (const auto* found = v.find(name)) *target = flag(*found);
+        if (const auto* found = v.find("audit")) m.audit = flag(*found);
         if (const auto* found = v.find("repeats")) m.repeats = static_cast<int>(whole(*found, 0, 1000));
         if (const auto* found = v.find("threads")) m.threads = static_cast<int>(whole(*found, 0, 4096));
         if (const auto* found = v.find("picture_size"))

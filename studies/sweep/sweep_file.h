@@ -5,6 +5,7 @@
 #include "scene/wires.h"
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -54,7 +55,8 @@ struct Measure {
     bool reference = false;  // against the exact integral: all errors
     bool srgb = false;       // also colour differences as a display shows them
     bool ssim = true;
-    bool audit = false;         // ranges, saturation, wrap and stuck T: one more render, audited
+    // Ranges, saturation, wrap and stuck T: one more render, audited.  Absent: of base points alone.
+    std::optional<bool> audit;
     bool conservation = false;  // |C + T - 1| with white colours and no light: one more render
     int repeats = 0;            // timed renders of a point, alone on the machine; 0: untimed
     int threads = 0;            // of a timed render; 0: one per processor

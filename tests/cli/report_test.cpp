@@ -1,6 +1,7 @@
 // squint report as numbers, and what its page is made of.  (How the page works: tests/report, in a browser.)
 #include "program.h"
 
+#include <map>
 #include <sstream>
 
 namespace squint::test {
@@ -117,6 +118,84 @@ TEST_F(ReportProgram, TheFirstLineIsTheCheapestPointUnderTheBound) {
     EXPECT_EQ(none["good"], false);
     EXPECT_TRUE(none["point"].is_null());
     EXPECT_EQ(none["text"].get<std::string>().find("No point is within"), 0u) << none["text"];
+}
+
+// Wires one at a time: the base point is audited, what costs most is what the records say it costs, and one more point
+// has all first formats at once.
+TEST_F(ReportProgram, WiresOneAtATimeEndWithAllFirstFormatsAtOnce) {
+    write("w.toml",
+          "[base]\nvolume.dims = 16\nimage.width = 16\nimage.height = 16\nprecision.preset = 'squeeze'\n"
+          "[wires]\nnames = ['color', 'weight', 'transparency']\nfraction_bits = [4, 8, 10, 13]\n");
+    ASSERT_EQ(squint("sweep w.toml -o wires -q").code, 0);
+    const Json report = squint("report wires --format json").json();
+    std::map<std::string, Json> by_hash;
+    for (const auto& entry : fs::directory_iterator(folder / "wires/points")) {
+        const Json record = Json::parse(contents(entry.path()));
+        by_hash[record["hash"]] = record;
+    }
+    const auto record_of = [&](const Json& entry) {
+        return by_hash.at(report["points"][entry["point"].get<std::size_t>()]["hash"]);
+    };
+    const auto error = [](const Json& r) { return r["error"]["real"]["color"]["rmse_lsb8"].get<double>(); };
+    const auto fraction_bits = [](const Json& r, const std::string& wire) {
+        const std::string spec = r["wires"][wire];
+        return std::stoi(spec.substr(spec.find('.') + 1));
+    };
+    const Json base = record_of(report["entries"][0]);
+    Json together;
+    std::map<std::string, std::map<int, Json>> series;  // wire -> fraction bits -> record
+    for (const Json& entry : report["entries"]) {
+        const Json record = record_of(entry);
+        const std::string varied = entry.value("varied", "");
+        EXPECT_EQ(record.contains("audit"), record["hash"] == base["hash"]) << varied;
+        if (varied == "together") together = record;
+        for (const char* wire : {"color", "weight", "transparency"})
+            if (varied.empty() || varied == std::string(wire) + " fraction_bits")
+                series[wire][fraction_bits(record, wire)] = record;
+    }
+    ASSERT_FALSE(together.is_null());
+    std::string dearest;
+    double most = 0, dearest_bit = 0;
+    const Json& answer = report["answer"];
+    const Json chosen = by_hash.at(report["points"][answer["point"].get<std::size_t>()]["hash"]);
+    for (const auto& [wire, records] : series) {
+        ASSERT_EQ(records.size(), 5u) << wire;
+        int first = fraction_bits(base, wire);
+        for (auto r = records.rbegin(); r != records.rend() && error(r->second) <= 0.5; ++r) first = r->first;
+        EXPECT_EQ(fraction_bits(together, wire), first) << wire;
+        const Json &least = records.begin()->second, &greatest = records.rbegin()->second;
+        const double a_bit = (greatest["cost"]["bits"].get<double>() - least["cost"]["bits"].get<double>()) /
+                             (records.rbegin()->first - records.begin()->first);
+        // Each of these has one integer bit and no sign.
+        const double all = a_bit * (1 + fraction_bits(chosen, wire));
+        if (all > most) most = all, dearest = wire, dearest_bit = a_bit;
+    }
+    EXPECT_EQ(answer["wire"], dearest);
+    EXPECT_DOUBLE_EQ(answer["bits_a_bit"].get<double>(), dearest_bit);
+    EXPECT_EQ(answer["format"], chosen["wires"][dearest]);
+    EXPECT_NE(answer["text"].get<std::string>().find("the wire that costs most is " + dearest + " ("),
+              std::string::npos)
+        << answer["text"];
+    EXPECT_NE(answer["text"].get<std::string>().find("other views"), std::string::npos) << answer["text"];
+    const Outcome again = squint("sweep w.toml -o wires");
+    EXPECT_NE(again.err.find("0 computed"), std::string::npos) << again.err;
+    EXPECT_EQ(squint("report wires --format json").json()["entries"], report["entries"]);
+}
+
+// Rounding alone says nothing of a method: where more than formats varies, the exact integral leads.
+TEST_F(ReportProgram, MethodsAreJudgedByTheExactIntegral) {
+    write("m.toml",
+          "[base]\nvolume.dims = 12\nimage.width = 8\nimage.height = 8\nlights = []\n"
+          "[measure]\nreference = true\n[[axis]]\nkey = 'classification.method'\nvalues = ['pc', 'pips']\n");
+    ASSERT_EQ(squint("sweep m.toml -o methods -q").code, 0);
+    const Json methods = squint("report methods --format json").json();
+    EXPECT_EQ(methods["against"], Json({"reference", "real"}));
+    EXPECT_EQ(methods["answer"]["against"], "reference");
+    write("f.toml",
+          "[base]\nvolume.dims = 12\nimage.width = 8\nimage.height = 8\nlights = []\n"
+          "[measure]\nreference = true\n[[axis]]\nwires = ['color']\nfraction_bits = [8, 12]\n");
+    ASSERT_EQ(squint("sweep f.toml -o formats -q").code, 0);
+    EXPECT_EQ(squint("report formats --format json").json()["against"], Json({"real", "reference"}));
 }
 
 TEST_F(ReportProgram, CommandsOfPointsRenderTheirPicturesAgain) {

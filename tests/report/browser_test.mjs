@@ -226,7 +226,7 @@ test('a search stands with its formats beside the scene\'s own and those of Sque
   const search = { max_error_lsb8: 0.5, figure: 'rms', cost: 'bits', trials: 77, pictures: 99, other_degrees: [45], found: candidate(9000, 'u1.9 rnd_conv'), scene: candidate(16000, 'u1.15'), squeeze: candidate(12000, 'u1.14 trn') };
   writeFileSync(file, JSON.stringify({ ...JSON.parse(readFileSync(file)), search }));
   const page = await is.open(browser, is.report('found'), 1280), text = await page.innerText('#search');
-  assert.match(text, /at most 0\.5 LSB8 \(rms\).* 77 sets of formats tried in 99 pictures/);
+  assert.match(text, /an rms error of at most 0\.5 LSB8.* 77 sets of formats tried in 99 pictures/);
   assert.match(text, /bits\s+9000\s+16000\s+12000/);
   assert.match(text, /fewer bits than Squeeze's\s+25 %\s+-33.3 %\s+-/);
   assert.match(text, /color\s+u1\.9 rnd_conv\s+u1\.15\s+u1\.14 trn/);
@@ -245,10 +245,16 @@ test('the first line is the answer, red where nothing keeps the bound', async ()
 
 test('printing draws every section, seen or not', async () => {
   const page = await is.open(browser, wires, 1280);
-  await page.waitForTimeout(600);
+  // Nobody scrolls: thumbnails are unpacked while the page lies there.
+  await page.waitForFunction(() => { const all = [...document.querySelectorAll('#grid canvas')]; return all.length && all.every((c) => c.width > 1); });
   await page.evaluate(() => dispatchEvent(new Event('beforeprint')));
   const blank = await page.$$eval('section:not([hidden])', (all) => all.filter((s) => [...s.querySelectorAll('.chart:not(.chart .chart)')].some((c) => !c.hidden && !c.querySelector('canvas, .nothing')) || (s.id === 'pictures' && (!s.querySelector('.grid canvas') || [...s.querySelectorAll('.grid canvas')].some((c) => c.width < 2))) || (s.id === 'table' && !s.querySelector('tbody tr'))).map((s) => s.id));
   assert.deepEqual(blank, []);
+  // On paper, narrower than the window was, no chart is cut off.
+  await page.emulateMedia({ media: 'print' });
+  await page.setViewportSize({ width: 720, height: 1000 });
+  const cut = await page.$$eval('.chart canvas', (all) => all.filter((c) => c.getBoundingClientRect().right > 720).map((c) => c.getAttribute('aria-label')));
+  assert.deepEqual(cut, []);
   assert.deepEqual(page.said, []);
   await page.close();
 });
@@ -257,10 +263,22 @@ test('formats that stand alone are told from all of them at once', async () => {
   const page = await is.open(browser, wires, 1280);
   await is.seeAll(page);
   assert.match(await page.textContent('#first-hint'), /^Wire by wire:/);
+  // The sweep has measured them together: the table ends with that, its command gives that picture.
+  const { points, entries } = data('wires'), together = points[entries.find((e) => e.varied === 'together').point];
+  assert.match(await page.textContent('#first-format tr.together'), new RegExp(`${together.cost.bits} bits.*${+together.error.real.color.rmse.toPrecision(4)}$`));
+  const run = (command) => {
+    const PATH = `${dirname(is.program)}:${process.env.PATH}`;
+    execFileSync('sh', ['-c', command.replace(/ -o \S+$/, '') + ' --json combined.json -q -o combined.exr'], { cwd: is.folder, env: { ...process.env, PATH } });
+    return JSON.parse(readFileSync(join(is.folder, 'combined.json'))).pictures[0];
+  };
+  assert.equal(run(await page.textContent('#combined-command')).hash, together.picture_hash);
+  // As another figure they are other formats, which nobody has measured: their command does.
+  await page.selectOption('#figure', 'max');
+  await page.locator('#curves').scrollIntoViewIfNeeded(); // what is not near is not drawn again
+  await page.waitForFunction(() => !document.querySelector('#first-format tr.together'));
   const command = await page.textContent('#combined-command');
-  assert.match(command, /^squint render .*--set 'precision\.color=.*--set 'precision\.transparency=.* --error$/);
-  const PATH = `${dirname(is.program)}:${process.env.PATH}`;
-  execFileSync('sh', ['-c', command + ' --json combined.json -q -o combined.exr'], { cwd: is.folder, env: { ...process.env, PATH } });
+  assert.match(command, /^squint render .*--set 'precision\.color=.* --error$/);
+  assert.ok(run(command).error.against_real);
   await page.close();
 });
 
@@ -274,10 +292,18 @@ test('points that failed stand in the table with their reasons', async () => {
   await page.close();
 });
 
+test('the ranges of the base point are drawn, asked for or not', async () => {
+  const page = await is.open(browser, product, 1280), audited = data('product').points.filter((p) => p.audit);
+  assert.equal(audited.length, 1);
+  await page.locator('#range-chart').scrollIntoViewIfNeeded();
+  await page.waitForSelector('#range-chart canvas');
+  assert.notEqual(await is.shown(page, '#range-chart canvas'), null);
+  await page.close();
+});
+
 test('the page names machine, version, command, sweep file, licences, and what was not measured', async () => {
   const page = await is.open(browser, product, 1280), { runs } = data('product');
   const about = await page.textContent('#about');
   for (const part of [runs[0].machine.cpu, runs[0].version, runs[0].command, 'measure.repeats', 'measure.audit', 'sampling.step', 'img-comparison-slider', 'BSD-3-Clause']) assert.ok(about.includes(part), part);
-  assert.equal(await page.isVisible('#ranges'), false);
   await page.close();
 });

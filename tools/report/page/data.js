@@ -75,6 +75,7 @@ const kBits = / (fraction_bits|fraction_offset|integer_bits|integer_offset)$/;
 const kShort = { fraction_bits: 'F', fraction_offset: 'F', integer_bits: 'I', integer_offset: 'I' };
 function labelOf(entry) {
   const parts = Object.entries(entry?.values ?? {}).map(([axis, value]) => {
+    if (axis === 'together') return value;
     const bits = kBits.exec(axis)?.[1];
     if (bits) return `${axis.replace(kBits, '')} ${kShort[bits]}${bits.endsWith('offset') ? (value < 0 ? '' : '+') : ' '}${value}`;
     return `${axis.replace(/^.*\.(?=[a-z_]+$)/, '')} ${valueText(value)}`;

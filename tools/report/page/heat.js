@@ -3,7 +3,7 @@ let heatAxes;
 function startHeat() {
   heatAxes = Object.keys(data.axes).filter((a) => !variedAxes.includes(a) && data.axes[a].length > 1).map((a) => ({ name: a, of: (e) => e.values[a], order: data.axes[a] }));
   const wires = data.mode === 'one_at_a_time' && variedAxes.length > 1;
-  if (wires) heatAxes.unshift({ name: 'its value', of: (e) => e.varied ? e.values[e.varied] : undefined }, { name: 'what is varied', of: (e) => e.varied?.replace(kBits, '') });
+  if (wires) heatAxes.unshift({ name: 'its value', of: (e) => e.varied && e.varied !== 'together' ? e.values[e.varied] : undefined }, { name: 'what is varied', of: (e) => e.varied?.replace(kBits, '') });
   if (heatAxes.length < 2) return void ($('heat').hidden = true);
   const names = heatAxes.map((a) => [a.name, a.name]);
   fill($('heat-x'), names, heatAxes[0].name), fill($('heat-y'), names, heatAxes[1].name);

@@ -17,7 +17,10 @@ function about() {
 function draw() {
   const timed = points.some((p) => p.ms !== undefined), model = points.some((p) => p.model);
   $('pareto-hint').textContent = 'Points that no other beats in both are dark and joined. Click one for its picture; drag a box to keep only what is in it, here and below.' + (model ? ' Triangles: timed in the model, since no lane holds these formats.' : '');
-  $('pareto-title').textContent = timed ? 'Error against time and bits' : 'Error against bits';
+  const measured = `${kFigures[state.figure]} of ${kChannels[state.channel]}, against ${kAgainst[state.against] ?? state.against}`;
+  $('pareto-title').textContent = `${measured}: by ${timed ? 'time and ' : ''}${kCosts[state.cost]}`;
+  $('sensitivity-title').textContent = `${measured}: ${wiresVaried() ? 'by the bits of each wire' : 'along each axis'}`;
+  $('heat-title').textContent = `${measured}: over two axes`;
   if (points.some(heldOut)) $('pareto-hint').textContent += ' Pictures of views that took no part in the search are not among them.';
   $('pareto-charts').classList.toggle('two', timed);
   $('pareto-time').hidden = !timed;
@@ -64,6 +67,6 @@ async function start() {
   if (best) choose(best.hash);
   requestAnimationFrame(() => { document.documentElement.dataset.ready = 'yes'; });
   // Printing waits for nobody: what it draws must be read by then.
-  setTimeout(async () => { audits ??= await readJson('audits'); await paintThumbnails(); }, 300);
+  setTimeout(async () => { audits ??= await readJson('audits'); await paintThumbnails(); }, 100);
 }
 start();

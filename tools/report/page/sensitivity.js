@@ -85,7 +85,7 @@ function wireSeries(kind, crossing) {
     const format = base && formatOf(base, wire), at = relative ? 0 : format ? +format[part] : null;
     const same = list.find((r) => r.at === at);
     if (same) same.base = true;
-    else if (at !== null && base && errorOf(base) !== null && at >= Math.min(...list.map((r) => r.at)) - 2) list.push({ at, p: base, base: true });
+    else if (at !== null && base && errorOf(base) !== null) list.push({ at, p: base, base: true });
     list.sort((r, s) => r.at - s.at);
   }
   return { series, base, relative, part };
@@ -125,8 +125,9 @@ function wirePanel(panel, stage, values, domain, ends, title) {
   const y = { field: 'error', ...errorAxis(domain) };
   const x = { field: 'at', type: 'quantitative', title, scale: { domain: ends, nice: false, padding: 8 }, axis: { tickMinStep: 1, format: 'd' } };
   const wires = [...new Set(values.map((v) => v.wire))].sort((a, b) => kWires.indexOf(a.split(' + ')[0]) - kWires.indexOf(b.split(' + ')[0]));
-  const scale = { domain: wires, range: kPalette }, long = wires.some((wire) => wire.length > 18);
-  const color = { field: 'wire', type: 'nominal', title: null, scale, legend: { orient: 'bottom', columns: long ? 1 : 3, labelLimit: long ? panel.clientWidth - 60 : 120, symbolType: 'stroke', symbolStrokeWidth: 3 } };
+  const scale = { domain: wires, range: kPalette }, longest = Math.max(...wires.map((wire) => wire.length));
+  const columns = longest > 30 ? 1 : longest > 18 ? 2 : 3, labelLimit = (panel.clientWidth - 60) / columns - 20;
+  const color = { field: 'wire', type: 'nominal', title: null, scale, legend: { orient: 'bottom', columns, labelLimit, symbolType: 'stroke', symbolStrokeWidth: 3 } };
   chart(panel, `${stage}: ${kFigures[state.figure]} across ${title}`, { title: stage, height: 200, data: { values }, layer: [
     ...halfLine(domain),
     { mark: { type: 'line', strokeWidth: 1.8 }, encoding: { x, y, color } },
@@ -146,15 +147,19 @@ function firstFormats(series, base, bitsOf) {
     return [wire, stageOf(wire), base?.wires?.[wire] ?? '', first ? first.p.wires?.[wire] ?? bitsOf(first) : 'none measured', number(errorOf((first ?? least).p))];
   });
   const cells = (tag, row) => row.map((cell, i) => element(tag, { class: i < 4 ? 'word' : '' }, cell));
-  place.replaceChildren(element('table', {}, element('thead', {}, element('tr', {}, ...cells('th', ['wire', 'stage', 'at the base point', `first format within ${boundName()}`, kFigures[state.figure] + ' there']))),
-    element('tbody', {}, ...rows.map((row) => element('tr', {}, ...cells('td', row))))));
-  combined(series, base);
+  const line = (tag, row, attributes = {}) => element('tr', attributes, ...cells(tag, row));
+  const firsts = [...series].map(([wire, list]) => [wire, firstWithin(list)?.p]).filter(([wire, p]) => stageOf(wire) && p?.wires?.[wire]);
+  const together = base && firsts.length > 1 ? pointWith(base, firsts) : null;
+  const last = together ? [line('td', ['all of these at once', '', '', `${number(together.cost.bits)} bits, ${number(base.cost.bits)} at the base point`, number(errorOf(together))], { class: 'together' })] : [];
+  place.replaceChildren(element('table', {}, element('thead', {}, line('th', ['wire', 'stage', 'at the base point', `first format within ${boundName()}`, kFigures[state.figure] + ' there'])),
+    element('tbody', {}, ...rows.map((row) => line('td', row)), ...last)));
+  if (base && firsts.length > 1) combined(base, firsts, together);
 }
-// What all these formats at once are has not been measured: how to measure it is said.
-function combined(series, base) {
-  const formats = [...series].map(([wire, list]) => [wire, firstWithin(list)?.p.wires?.[wire]]).filter(([, format]) => format);
-  if (!base || formats.length < 2) return;
-  $('first-hint').textContent = 'Wire by wire: each format stands alone, the other wires as at the base point. All of them at once have an error of their own, mostly a greater one; this command measures it:';
-  $('combined-command').textContent = `${base.command.replace(/ -o \S+$/, '')} ${formats.map(([wire, format]) => `--set 'precision.${wire}=${format}'`).join(' ')} --error`;
+// The point that has all these formats and else the base's, where the sweep has measured it.
+const pointWith = (base, firsts) => points.find((p) => done(p) && errorOf(p) !== null && crossOf(p.entry) === crossOf(base.entry) && p.entry.varied === 'together' && Object.entries(base.wires).every(([wire, format]) => p.wires[wire] === (firsts.find(([name]) => name === wire)?.[1].wires[wire] ?? format)));
+function combined(base, firsts, together) {
+  const alone = 'Wire by wire: each format stands alone, the other wires as at the base point. All of them at once have an error of their own';
+  $('first-hint').textContent = alone + (together ? `, ${number(errorOf(together))} (${kFigures[state.figure]}): the last line, with its command below.` : ', mostly a greater one, that this sweep has not measured; the command below the table does.');
+  $('combined-command').textContent = together ? together.command : `${base.command.replace(/ -o \S+$/, '')} ${firsts.map(([wire, p]) => `--set 'precision.${wire}=${p.wires[wire]}'`).join(' ')} --error`;
   $('combined').hidden = false;
 }
