@@ -179,11 +179,11 @@ Error measured(const SlabFunction& method, const std::vector<DrawnSlab>& slabs,
     for (std::size_t i = 0; i < slabs.size(); ++i) {
         const SlabValue value = method(slabs[i]);
         const double alpha = std::abs(value.alpha - truth[i].alpha) * 255;
-        error.alpha_rms += alpha * alpha / slabs.size();
+        error.alpha_rms += alpha * alpha / static_cast<double>(slabs.size());
         error.alpha_max = std::max(error.alpha_max, alpha);
         for (int k = 0; k < 3; ++k) {
             const double color = std::abs(value.color[k] - truth[i].color[k]) * 255;
-            error.color_rms += color * color / (3 * slabs.size());
+            error.color_rms += color * color / static_cast<double>(3 * slabs.size());
             error.color_max = std::max(error.color_max, color);
         }
     }

@@ -75,7 +75,7 @@ TEST_P(EveryField, GradientsAreFiniteAtTheMiddleAndTheCorners) {
 INSTANTIATE_TEST_SUITE_P(Fields, EveryField,
                          testing::Values("phantom", "sphere", "marschner_lobb", "shells", "ramp", "constant",
                                          "fog", "polynomial"),
-                         [](const auto& info) { return info.param; });
+                         [](const auto& test) { return test.param; });
 
 TEST(Procedural, ScalarsAreTheRoundedValuesAtVoxelCentres) {
     const Volume volume = make_procedural(named("ramp"), {256, 2, 3}, 8);

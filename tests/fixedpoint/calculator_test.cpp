@@ -43,12 +43,13 @@ TEST(Calculator, ProductsAndSumsOfSmallFormatsAreExactThenRoundedOnce) {
                 for (const char* operation : {"add", "sub", "mul"}) {
                     const Calculation c = calculated(
                         fmt::format("s4.1 {} {} s1.2 #{} #{}", to_string(rounding), operation, a, b));
-                    const double x = a / 4.0, y = b / 4.0;
+                    const double x = static_cast<double>(a) / 4, y = static_cast<double>(b) / 4;
                     const double exact = *operation == 'a' ? x + y : *operation == 's' ? x - y : x * y;
-                    EXPECT_EQ(c.raw, rounded(2 * exact, rounding)) << operation << a << ' ' << b;
-                    EXPECT_EQ(c.inexact, c.raw != 2 * exact);
+                    const auto raw = static_cast<double>(c.raw);
+                    EXPECT_EQ(raw, rounded(2 * exact, rounding)) << operation << a << ' ' << b;
+                    EXPECT_EQ(c.inexact, raw != 2 * exact);
                     EXPECT_FALSE(c.overflow);
-                    EXPECT_EQ(last_bits(c), c.raw - 2 * exact);
+                    EXPECT_EQ(last_bits(c), raw - 2 * exact);
                 }
 }
 

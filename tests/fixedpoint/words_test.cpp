@@ -89,8 +89,8 @@ TEST(Audited, CountsRoundedUnderflownSaturatedAndWrappedValues) {
 TEST(Words, ShiftByIsMultiplicationByAPowerOfTwoRoundedDown) {
     for (std::int64_t x = 0; x < 300; ++x)
         for (std::int64_t bits = -12; bits <= 12; ++bits)
-            EXPECT_EQ(shift_by(x, bits),
-                      static_cast<std::int64_t>(std::floor(std::ldexp(static_cast<double>(x), bits))));
+            EXPECT_EQ(shift_by(x, bits), static_cast<std::int64_t>(std::floor(
+                                             std::ldexp(static_cast<double>(x), static_cast<int>(bits)))));
 }
 
 TEST(Words, BlendLiesBetweenItsEndsAndIsExact) {
@@ -142,7 +142,7 @@ TEST(Range, HoldsEveryResultOfEveryOperation) {
             const Rescale up(spec.format.fraction_bits - bits, spec);
             ASSERT_TRUE(holds(quotient(p, q, up), quotient(n, d, up)))
                 << n << " / " << d << " to " << to_string(spec);
-            const auto part = [](std::int64_t x) { return x & 0x7fff; };
+            const auto part = [](std::int64_t whole) { return whole & 0x7fff; };
             const std::array<std::int64_t, 3> vector{part(n), part(d), part(n + d)};
             const std::array<Range, 3> vectors{Range{0, vector[0] + 3}, Range{0, vector[1]},
                                                Range{0, 0x7fff}};

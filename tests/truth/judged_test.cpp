@@ -146,7 +146,8 @@ struct Field {
 };
 std::vector<Field> fields() {
     const auto smooth = [](const Index3& p) {
-        return 2048 + 1000 * std::sin(p.x * 0.5) + 900 * std::sin(p.y * 0.4 + 1) * std::cos(p.z * 0.3);
+        const Vec3 at(p);
+        return 2048 + 1000 * std::sin(at.x * 0.5) + 900 * std::sin(at.y * 0.4 + 1) * std::cos(at.z * 0.3);
     };
     const auto plateau = [](const Index3& p) {
         return std::min<std::int64_t>(180, 20 * std::min({p.x, p.y, p.z}) + 3);

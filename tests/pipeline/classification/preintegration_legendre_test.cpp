@@ -98,7 +98,7 @@ TEST(LegendreSeries, BeatsPipsOnSlabsOfDepthOneByFarMoreThanSixDecibels) {
                 method.slab(front, back, length).color.x - exact_slab(entries, front, back, length).color.x;
             sum += error * error;
         }
-        return std::sqrt(sum / slabs.size());
+        return std::sqrt(sum / static_cast<double>(slabs.size()));
     };
     const double one = rms(build_power_series(entries, 1)), two = rms(build_legendre_series(entries, 2, 2));
     EXPECT_GT(20 * std::log10(one / two), 6);

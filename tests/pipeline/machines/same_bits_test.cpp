@@ -97,8 +97,7 @@ void draw_transfer_function(Draw& draw, const Volume& volume, Scene& scene) {
 void draw_camera(Draw& draw, const Volume& volume, Scene& scene) {
     CameraSettings& camera = scene.camera;
     camera = {};
-    const Vec3 high =
-        volume.world_from_voxel(Vec3(volume.dims.x - 1.0, volume.dims.y - 1.0, volume.dims.z - 1.0));
+    const Vec3 high = volume.world_from_voxel(Vec3(volume.dims - Index3(1)));
     camera.projection = draw.any_of<Projection>();
     camera.azimuth = draw.one_of({0.0, 90.0, 45.0, draw.real(0, 360)});
     camera.elevation = draw.one_of({0.0, 90.0, -90.0, draw.real(-90, 90)});

@@ -33,7 +33,7 @@ void set_power(ShadingStage& s, PowerRule rule, int exponent, int fraction_bits,
                Rounding rounding = Rounding::rnd_conv) {
     const Spec power = unsigned_spec(fraction_bits, rounding);
     s.power = rule, s.power_fraction = fraction_bits;
-    s.squarings = bit_length(Word{exponent}) - 1;
+    s.squarings = static_cast<int>(bit_length(Word{exponent})) - 1;
     s.parabola_slope = exponent + 1;
     s.power_table_bits = std::min(10, fraction_bits);
     s.power_table = Table((1 << s.power_table_bits) + 1, 1);
