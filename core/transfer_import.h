@@ -17,8 +17,7 @@ bool find_transfer_preset(std::string_view name, TransferFunction& function);
 /// ParaView's JSON colour map: an object, or a list of which `map` names one (empty: the only one), with
 ///
 ///     "RGBPoints": [value, r, g, b, ...]                   required
-///     "Points": [value, alpha, midpoint, sharpness, ...]   midpoint 0.5 and sharpness 0; absent: alpha rises from 0
-///                                                          to 1
+///     "Points": [value, alpha, midpoint, sharpness, ...]   midpoint 0.5, sharpness 0; absent: alpha rises 0 to 1
 ///     "ColorSpace": "RGB"                                  absent: RGB; HSV ("HSVWrap": 1: the shorter way round),
 ///                                                          Lab, CIELAB, Diverging and Step are sampled
 ///
