@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 """Light inside a slab: error and time of every rule, beside PC's and beside the unlit scene's.
 
-    SQUINT_DATA=... bench/inside.py error [--size 256x256] [--scenes engine_translucent ...] [--squint build/release/cli/squint]
-    SQUINT_DATA=... bench/inside.py speed
+    SQUINT_DATA=... squint sweep configs/sweeps/inside.toml -o RUN     (again to go on; --set image.width=64 ... for a quick one)
+    bench/inside.py error RUN
+    SQUINT_DATA=... bench/inside.py speed [--size 256x256] [--scenes engine_translucent ...] [--before PROGRAM]
 
-Prints Markdown.  Error: foreground PSNR against the exact integral along each ray, dB, `precision.preset` real and default.
-Speed: processor time of a program that draws one lit frame, over that of one with `mean`: the median of paired runs.
+Prints Markdown.  Error: foreground PSNR of the sweep's points against the exact integral along each ray, dB.
+Speed: processor time of a program that draws one lit frame, over that of one with `mean` (of another program with --before):
+the median of paired runs.
 """
 import argparse
 import json
@@ -18,50 +20,50 @@ SCENES = sorted(p.stem for p in pathlib.Path("configs/bench").glob("*.toml"))
 RULES = ["mean", "front", "middle", "adaptive"]
 
 
-def settings(rule, step, preset="default"):
+def settings(rule, step):
     method = "pc" if rule == "pc" else "pips"
-    chosen = [] if rule in ("pc", "unlit") else [f"shading.inside={rule}"]
-    if rule == "unlit":
-        chosen = ["lights=[]"]
-    return [f"classification.method={method}", f"sampling.step={step}", f"precision.preset={preset}", *chosen]
+    chosen = [] if rule == "pc" else [f"shading.inside={rule}"]
+    return [f"classification.method={method}", f"sampling.step={step}", *chosen]
 
 
 def run(squint, scene, size, settings, *more):
-    command = [squint, "render", f"configs/bench/{scene}.toml", "--size", size, "-q", "--json", "-", "-o", "/dev/null", *more]
+    command = [squint, "render", f"configs/bench/{scene}.toml", "--size", size, "-q", "-o", "/dev/null", *more]
     for setting in settings:
         command += ["--set", setting]
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    record = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return json.loads(record)["pictures"][0], after.ru_utime - before.ru_utime
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    subprocess.run(command, check=True)
+    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
 
 
-def psnr(picture):
-    figure = picture["error"]["against_reference"]["foreground"]["RGB"]["psnr"]
-    return "exact" if figure is None else f"{figure:.1f}"
+def error(folder):
+    sweep = json.loads((folder / "sweep.json").read_text())
+    ways, rows = sweep["axes"]["light"], {}
+    for path in sorted((folder / "points").glob("*.json")):
+        point = json.loads(path.read_text())
+        if point["status"] != "done":
+            continue
+        at = next(p["values"] for p in sweep["points"] if p["hash"] == point["hash"])
+        row = (pathlib.Path(point["scene"]).stem, at["sampling.step"], at["precision.preset"])
+        figure = point["error"]["reference"]["color"]["psnr"]
+        rows.setdefault(row, {})[at["light"]] = "exact" if figure is None else f"{figure:.1f}"
+    print("| scene | step | preset | " + " | ".join(ways) + " |")
+    print("|---" * (3 + len(ways)) + "|")
+    for row in sorted(rows, key=lambda r: (r[0], r[2], -r[1])):
+        print(f"| {row[0]} | {row[1]:g} | {row[2]} | " + " | ".join(rows[row].get(way, "") for way in ways) + " |")
 
 
-def error(squint, scenes, size):
-    print("| scene | step | preset | unlit PIPS(1) | PC | " + " | ".join(RULES) + " |")
-    print("|---" * (5 + len(RULES)) + "|")
-    for scene in scenes:
-        for step in (1, 0.5):
-            for preset in ("real", "default"):
-                cells = [psnr(run(squint, scene, size, settings(rule, step, preset), "--reference")[0])
-                         for rule in ["unlit", "pc", *RULES]]
-                print(f"| {scene} | {step} | {preset} | " + " | ".join(cells) + " |", flush=True)
-
-
-def speed(squint, scenes, size, pairs):
-    print("| scene | step | " + " | ".join(["pc", *RULES[1:]]) + " |")
-    print("|---" * (2 + len(RULES)) + "|")
+def speed(squint, before, scenes, size, pairs):
+    ways = ["pc", *(RULES if before else RULES[1:])]
+    print("| scene | step | " + " | ".join(ways) + " |")
+    print("|---" * (2 + len(ways)) + "|")
     for scene in scenes:
         for step in (1, 0.5):
             cells = []
-            for rule in ["pc", *RULES[1:]]:
+            for rule in ways:
                 ratios = []
                 for _ in range(pairs):
-                    seconds = [run(squint, scene, size, settings(r, step), "--threads", "1")[1] for r in (rule, "mean")]
+                    seconds = [run(program, scene, size, settings(r, step), "--threads", "1")
+                               for program, r in ((squint, rule), (before or squint, "mean"))]
                     ratios.append(seconds[0] / seconds[1])
                 cells.append(f"{statistics.median(ratios):.2f}")
             print(f"| {scene} | {step} | " + " | ".join(cells) + " |", flush=True)
@@ -69,13 +71,16 @@ def speed(squint, scenes, size, pairs):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["error", "speed"])
-    parser.add_argument("--size", default="256x256")
-    parser.add_argument("--scenes", nargs="+", default=SCENES)
-    parser.add_argument("--pairs", type=int, default=7)
-    parser.add_argument("--squint", default="build/release/cli/squint")
+    verbs = parser.add_subparsers(dest="what", required=True)
+    verbs.add_parser("error").add_argument("folder", type=pathlib.Path)
+    timed = verbs.add_parser("speed")
+    timed.add_argument("--size", default="256x256")
+    timed.add_argument("--scenes", nargs="+", default=SCENES)
+    timed.add_argument("--pairs", type=int, default=7)
+    timed.add_argument("--squint", default="build/release/cli/squint")
+    timed.add_argument("--before", help="a program of before, whose `mean` is the measure")
     a = parser.parse_args()
     if a.what == "error":
-        error(a.squint, a.scenes, a.size)
+        error(a.folder)
     else:
-        speed(a.squint, a.scenes, a.size, a.pairs)
+        speed(a.squint, a.before, a.scenes, a.size, a.pairs)

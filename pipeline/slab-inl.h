@@ -167,23 +167,16 @@ class Slabs {
         const InsideStage& inside = plan_.inside;
         if (inside.rule == InsideRule::front) return light_with(gradient_of(front), slab);
         if (inside.rule == InsideRule::middle) return light_with(gradient_between(front, back, 1, 1), slab);
-        if (inside.rule == InsideRule::mean) {
-            std::array<W, 3> gradient = gradient_of(front);
-            const std::array<W, 3>& other = gradient_of(back);
-            observer_.at(Part::gradient);
-            for (std::size_t a = 0; a < 3; ++a) gradient[a] = gradient[a] + other[a];
-            return light_with(gradient, slab);
-        }
+        const std::array<W, 3>&at_front = gradient_of(front), &at_back = gradient_of(back);
+        observer_.at(Part::gradient);
+        const std::array<W, 3> sum = sum_of_ends(at_front, at_back);
+        if (inside.rule == InsideRule::mean) return light_with(sum, slab);
         const W zero = constant<W>(0);
-        W cuts = zero;
+        observer_.at(Part::normal);
         const auto worth_it = !(slab.alpha < constant<W>(inside.least_cut));
-        if (any(worth_it)) {
-            const std::array<W, 3>&at_front = gradient_of(front), &at_back = gradient_of(back);
-            observer_.at(Part::normal);
-            cuts = select(worth_it, cuts_between(at_front, at_back), zero);
-        }
+        const W cuts = select(worth_it, cuts_between(at_front, at_back), zero);
         Slab<W> whole = slab;
-        if (any(cuts == zero)) light_with(gradient_between(front, back, 1, 1), whole);
+        if (any(cuts == zero)) light_with(sum, whole);
         slab.color = whole.color;
         for (int bits = 1; bits <= kMostCuts; ++bits) {
             const auto so_many = cuts == constant<W>(bits);
@@ -207,7 +200,8 @@ class Slabs {
             const W far_length = last ? length : length_up_to(inside, length, i, bits);
             Slab<W> piece = classify(method_, near, far, far_length - near_length);
             if (any(constant<W>(0) < piece.alpha)) {
-                light_with(gradient_between(front, back, 2 * i - 1, bits + 1), piece, !seen);
+                light_with(for_pieces(plan_.gradient, gradient_between(front, back, 2 * i - 1, bits + 1)),
+                           piece, !seen);
                 seen = true;
                 add_piece(inside, sum, piece.color, piece.alpha);
             }

@@ -81,8 +81,8 @@ struct Plan {
     std::string real_name() const { return float32 ? "float32" : "real"; }
     /// Slab methods and projections look at both ends of each slab, and so at the ray's exit.
     bool samples_both_ends() const { return needs_back || projection_mode; }
-    /// The number of gradients that light a slab.
-    int gradients_a_slab() const { return inside.rule == InsideRule::mean ? 2 : 1; }
+    /// Whether light comes by the gradients at slabs' ends, which neighbours share.
+    bool shares_ends() const { return lit && lights_by_ends(inside.rule); }
     /// Whether stage 3 needs samples' locations, not only their cells.
     bool keeps_locations() const { return gradient_from_samples() || (lit && inside.samples_between()); }
     bool gradient_from_samples() const { return lit && gradient.rule == GradientRule::central_samples; }

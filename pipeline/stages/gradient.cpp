@@ -1,6 +1,7 @@
 #include "pipeline/stages/gradient.h"
 
 #include "pipeline/stages/inputs.h"
+#include "pipeline/stages/inside.h"
 #include "pipeline/stages/presets.h"
 
 #include <algorithm>
@@ -14,7 +15,7 @@ std::vector<WireFormats> gradient_wires(const PresetInputs& in) {
     // Weak gradients need fraction bits; half a difference of scalars has one bit less than they.
     const Spec standard = signed_spec(range, std::min(12, 32 - range - weight_bits(in)), kToEven),
                squeeze = signed_spec(12, 12, trn), eight_bit = signed_spec(scalar, 1, trn),
-               wide = signed_spec(scalar, 16, kToEven);
+               wide = signed_spec(scalar, std::min(16, 30 - scalar), kToEven);
     return {{Wire::gradient_lerp, standard, squeeze, eight_bit, wide},
             {Wire::gradient, standard, squeeze, eight_bit, wide},
             {Wire::spacing, unsigned_spec(1, 12, kToEven), unsigned_spec(1, 12, trn),
@@ -62,7 +63,7 @@ GradientStage build_gradient(const StageInputs& in) {
     if (const double floor = in.scene.shading.gradient_floor; in.lit && floor > 0) {
         require_integer_bits(in, Wire::confidence, 1, "a confidence of 1.0");
         // The sum of the gradients at a slab's ends is twice as long as their mean.
-        fade_in_up_to(s, (in.inside == InsideRule::mean ? 2 : 1) * floor * one);
+        fade_in_up_to(s, (lights_by_ends(in.inside) ? 2 : 1) * floor * one);
     }
     return s;
 }

@@ -10,6 +10,7 @@
 
 #include "fixedpoint/unrolled-inl.h"
 #include "pipeline/classification/prefix-inl.h"
+#include "pipeline/stages/gradient.h"
 
 #include <hwy/highway.h>
 
@@ -76,6 +77,17 @@ HWY_INLINE W cuts_between(const std::array<W, 3>& front, const std::array<W, 3>&
     const W lengths = f.length * b.length;
     const W zero = constant<W>(0), one = constant<W>(1), two = constant<W>(2);
     return select(dot < constant<W>(23) * lengths, two, select(dot < constant<W>(31) * lengths, one, zero));
+}
+
+/// Twice the mean of the gradients at a slab's ends: the same normal, and no bit lost.
+template <class W>
+HWY_INLINE std::array<W, 3> sum_of_ends(const std::array<W, 3>& front, const std::array<W, 3>& back) {
+    return {front[0] + back[0], front[1] + back[1], front[2] + back[2]};
+}
+/// A piece's gradient beside such sums: twice as long where lengths matter.
+template <class W>
+HWY_INLINE std::array<W, 3> for_pieces(const GradientStage& s, const std::array<W, 3>& gradient) {
+    return s.fades ? sum_of_ends(gradient, gradient) : gradient;
 }
 
 /// The light of a slab's pieces, front to back, joined to one straight colour.

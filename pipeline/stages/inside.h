@@ -4,8 +4,8 @@
 //     mean       the mean of the raw gradients at both ends
 //     front      the gradient at the front end
 //     middle     one gradient, sampled at the slab's middle
-//     adaptive   1, 2 or 4 pieces, by the angle between the gradients at the ends; a piece is a slab of the
-//                method's own tables with a gradient sampled at its middle
+//     adaptive   up to an angle between the ends' gradients as mean; beyond it 2 or 4 pieces, each a slab of
+//                the method's own tables with a gradient sampled at its middle
 #pragma once
 
 #include "fixedpoint/words.h"
@@ -18,6 +18,11 @@ namespace squint {
 
 /// A slab is cut into at most 2^kMostCuts pieces.
 inline constexpr int kMostCuts = 2;
+
+/// Whether a rule lights by the sum of the gradients at a slab's ends.
+constexpr bool lights_by_ends(InsideRule rule) {
+    return rule == InsideRule::mean || rule == InsideRule::adaptive;
+}
 
 struct InsideStage {
     InsideRule rule = InsideRule::mean;

@@ -46,16 +46,20 @@ struct StageKernels {
     void (*hide)(const Plan&, const RayPacket&, const PixelPacket&, int steps, Samples&) = nullptr;
     /// Of slabs [0, steps): those in which something is to be seen, packed.  Gives their number.
     int (*gather_lit)(const Plan&, const RayPacket&, int steps, const Samples&, LitSamples&) = nullptr;
-    /// Where slabs are lit in pieces: the ends of slabs that may be cut, in rows
-    /// [0, steps], each once.  Gives their number.
-    int (*gather_ends)(const Plan&, const RayPacket&, int steps, const Samples&, LitSamples& ends) = nullptr;
+    /// The ends of slabs in which something is to be seen, in rows [0, steps], each once and none that is
+    /// known; notes of which rays the one in row `steps` is among them.  Gives their number.
+    int (*gather_ends)(const Plan&, const RayPacket&, int steps, const Samples&, Row& known,
+                       LitSamples& ends) = nullptr;
+    /// Raw gradients of gathered slabs: the sums of those at their ends.
+    void (*add_ends)(const Plan&, int count, const EndGradients&, LitSamples&) = nullptr;
     /// Places `part` 2^-bits of the way along gathered slabs [at, at + count), to places from `to` on.
     void (*place_between)(const Plan&, const LitSamples& slabs, int at, int count, int part, int bits,
                           LitSamples& places, int to) = nullptr;
-    /// Raw gradients alone, of one place each.
+    /// Raw gradients of the first `count` gathered places; this, find_normals and shade read and write up to
+    /// the next multiple of the lanes.
     void (*find_gradients)(const Plan&, int count, LitSamples&) = nullptr;
     /// log2 of the pieces of gathered slabs, from the raw gradients at their ends, by place in the batch.
-    void (*find_cuts)(const Plan&, int count, const Batch (&gradient)[3], LitSamples&) = nullptr;
+    void (*find_cuts)(const Plan&, int count, const EndGradients&, LitSamples&) = nullptr;
     /// Of gathered slabs those with so many cuts, and their number; up to the next sixteen the last again.
     int (*pick_by_cuts)(const Plan&, int count, int cuts, const LitSamples&, LitSamples& picked) = nullptr;
     /// Sixteen slabs from `at` on in 2^bits pieces, row i piece i, ready to be classified.
@@ -65,13 +69,11 @@ struct StageKernels {
     /// The voxels about the first `count` gathered samples, as many as the gradient's rule wants.
     void (*fetch_lit)(const Plan&, int count, LitSamples&) = nullptr;
     /// In place of fetch_lit for gradients from samples.  Rows [0, rows) of 16 gathered samples each: one
-    /// voxel on from one end along an axis, their cells and weights.
-    void (*step_aside)(const Plan&, const LitSamples&, int end, int axis, bool ahead, int rows,
-                       Samples&) = nullptr;
+    /// voxel on along an axis, their cells and weights.
+    void (*step_aside)(const Plan&, const LitSamples&, int axis, bool ahead, int rows, Samples&) = nullptr;
     /// Rows [from, to): corners to scalars, which take the inputs' place.
     void (*interpolate_scalars)(const Plan&, int from, int to, Samples&) = nullptr;
-    /// Normals of the first `count` gathered samples; this and the next read and write up to the next
-    /// multiple of the lanes.
+    /// Their normals, and how far each is to be trusted.
     void (*find_normals)(const Plan&, int count, LitSamples&) = nullptr;
     /// Their colours.
     void (*shade)(const Plan&, int count, LitSamples&) = nullptr;

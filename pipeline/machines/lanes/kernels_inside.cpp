@@ -13,8 +13,8 @@
 #include "pipeline/stages/inside-inl.h"
 #include "pipeline/stages/location-inl.h"
 
+#include <algorithm>
 #include <array>
-#include <bit>
 
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
@@ -31,28 +31,27 @@ HWY_INLINE std::array<L, 3> load_three(const lanes::Batch (&from)[3], int at) {
     return {load<L>(from[0].v + at), load<L>(from[1].v + at), load<L>(from[2].v + at)};
 }
 
-/// A word of the plan's as it stands in the buffers.
-Word in_buffer(const Plan& plan, std::int64_t word) {
-    return plan.float32 ? std::bit_cast<Word>(static_cast<float>(word)) : static_cast<Word>(word);
-}
-
-/// Samples at the ends of slabs that may be cut, each once.
-int gather_turning_ends(const Plan& plan, const lanes::RayPacket& rays, int steps, const Samples& s,
-                        LitSamples& ends) {
+/// Samples at the ends of slabs in which something is to be seen, each once.
+int gather_slab_ends(const Plan& plan, const lanes::RayPacket& rays, int steps, const Samples& s,
+                     lanes::Row& known, LitSamples& ends) {
     const hn::ScalableTag<Word> d;
-    const auto before_least = hn::Set(d, in_buffer(plan, plan.inside.least_cut) - 1);
+    const auto zero = hn::Zero(d), one = hn::Set(d, 1);
     const bool from_samples = plan.gradient_from_samples();
     int count = 0;
     for (int at = 0; at < (steps + 1) * kRays; at += kLanes) {
         const auto slabs = hn::Load(d, rays.slabs.v + at % kRays);
         // Of the slab in this row, and of the one in front of it.
-        const auto thick = [&](int place) {
+        const auto seen = [&](int place) {
             const auto within = hn::Gt(slabs, hn::Set(d, s.first + place / kRays));
-            return hn::And(hn::Gt(hn::Load(d, s.alpha.v + place), before_least), within);
+            return hn::And(hn::Gt(hn::Load(d, s.alpha.v + place), zero), within);
         };
-        auto wanted = hn::Gt(hn::Zero(d), hn::Zero(d));
-        if (at < steps * kRays) wanted = thick(at);
-        if (at >= kRays) wanted = hn::Or(wanted, thick(at - kRays));
+        auto wanted = hn::Gt(zero, zero);
+        if (at < steps * kRays) wanted = seen(at);
+        if (at >= kRays)
+            wanted = hn::Or(wanted, seen(at - kRays));
+        else
+            wanted = hn::And(wanted, hn::Eq(hn::Load(d, known.v + at), zero));
+        if (at >= steps * kRays) hn::Store(hn::IfThenElseZero(wanted, one), d, known.v + at % kRays);
         if (hn::AllFalse(d, wanted)) continue;
         const Packing packing(wanted);
         const auto pack = [&](const Word* from, lanes::Batch& to) {
@@ -64,8 +63,8 @@ int gather_turning_ends(const Plan& plan, const lanes::RayPacket& rays, int step
                 pack(s.location[a].v + at, ends.location[0][a]);
                 continue;
             }
-            pack(s.cell[a].v + at, ends.cell[0][a]);
-            pack(s.weight[a].v + at, ends.weight[0][a]);
+            pack(s.cell[a].v + at, ends.cell[a]);
+            pack(s.weight[a].v + at, ends.weight[a]);
         }
         count += packing.count();
     }
@@ -78,14 +77,12 @@ int pick_by_cuts(const Plan& plan, int count, int cuts, const LitSamples& lit, L
     const ShadingStage& shading = plan.shading;
     int many = 0;
     const auto copy_all = [&](auto&& copy) {
-        copy(lit.from, picked.from), copy(lit.length, picked.length), copy(lit.alpha, picked.alpha);
+        copy(lit.from, picked.from), copy(lit.length, picked.length);
         for (int end = 0; end < 2; ++end) {
             copy(lit.input[end], picked.input[end]);
             for (int a = 0; a < 3; ++a) copy(lit.location[end][a], picked.location[end][a]);
         }
-        for (int a = 0; a < 3; ++a) {
-            copy(lit.color[a], picked.color[a]);
-            if (!shading.needs_ray()) continue;
+        for (int a = 0; shading.needs_ray() && a < 3; ++a) {
             copy(lit.view[a], picked.view[a]);
             for (int l = 0; l < shading.lights; ++l) copy(lit.half[l][a], picked.half[l][a]);
         }
@@ -122,8 +119,8 @@ void place_between(const Plan& plan, const LitSamples& ends, int at, int count, 
         }
         const CellPosition<L> position = cell_position(plan.location, location);
         for (std::size_t a = 0; a < 3; ++a) {
-            store_whole(position.cell[a], places.cell[0][a].v + to + i);
-            store(position.weight[a], places.weight[0][a].v + to + i);
+            store_whole(position.cell[a], places.cell[a].v + to + i);
+            store(position.weight[a], places.weight[a].v + to + i);
         }
     }
 }
@@ -147,23 +144,46 @@ void cut_sixteen(const Plan& plan, const LitSamples& slabs, int at, int bits, Sa
     }
 }
 
-/// log2 of the pieces of gathered slabs, whose ends' raw gradients stand in `gradient` by place.
+/// A component of the gradients at gathered slabs' fronts, or at their backs.
+HWY_INLINE auto end_words(const lanes::EndGradients& ends, int component, const Word* from, bool back) {
+    const hn::ScalableTag<Word> d;
+    return hn::GatherIndex(d, ends.component[component].v + (back ? kRays : 0), hn::Load(d, from));
+}
+/// Raw gradients of gathered slabs: what sum_of_ends is over the words of the buffers.
+void add_slab_ends(const Plan& plan, int count, const lanes::EndGradients& ends, LitSamples& lit) {
+    const hn::ScalableTag<Word> d;
+    const hn::ScalableTag<float> df;
+    for (int at = 0; at < count; at += kLanes)
+        for (int a = 0; a < 3; ++a) {
+            const auto front = end_words(ends, a, lit.from.v + at, false),
+                       back = end_words(ends, a, lit.from.v + at, true);
+            const auto sum = plan.float32
+                                 ? hn::BitCast(d, hn::Add(hn::BitCast(df, front), hn::BitCast(df, back)))
+                                 : hn::Add(front, back);
+            hn::Store(sum, d, lit.gradient[a].v + at);
+        }
+}
+
+/// log2 of the pieces of gathered slabs.
 template <class L>
-void find_cuts(const Plan& plan, int count, const lanes::Batch (&gradient)[3], LitSamples& lit) {
+void find_cuts(const Plan& plan, int count, const lanes::EndGradients& ends, LitSamples& lit) {
+    const hn::ScalableTag<Word> d;
     const L zero = constant<L>(0), least = constant<L>(plan.inside.least_cut);
-    alignas(64) Word end[2][3][kRays];
-    for (int at = 0; at < count; at += static_cast<int>(L::count())) {
-        for (int i = 0; i < static_cast<int>(L::count()); ++i)
-            for (int a = 0; a < 3; ++a) {
-                const int place = at + i < count ? lit.from.v[at + i] : lit.from.v[at];
-                end[0][a][i] = gradient[a].v[place], end[1][a][i] = gradient[a].v[place + kRays];
-            }
-        const auto load_end = [&](int e) {
-            return std::array<L, 3>{load<L>(end[e][0]), load<L>(end[e][1]), load<L>(end[e][2])};
-        };
-        const L cuts =
-            select(load<L>(lit.alpha.v + at) < least, zero, cuts_between(load_end(0), load_end(1)));
-        store_whole(cuts, lit.cuts.v + at);
+    constexpr int kStep = std::max(kLanes, static_cast<int>(L::count()));
+    alignas(64) Word end[2][3][kStep];
+    for (int first = 0; first < count; first += kStep) {
+        for (int e = 0; e < 2; ++e)
+            for (int a = 0; a < 3; ++a)
+                for (int i = 0; i < kStep; i += kLanes)
+                    hn::Store(end_words(ends, a, lit.from.v + first + i, e == 1), d, end[e][a] + i);
+        for (int i = 0; i < kStep; i += static_cast<int>(L::count())) {
+            const auto at_end = [&](int e) {
+                return std::array<L, 3>{load<L>(end[e][0] + i), load<L>(end[e][1] + i),
+                                        load<L>(end[e][2] + i)};
+            };
+            const L cuts = cuts_between(at_end(0), at_end(1));
+            store_whole(select(load<L>(lit.alpha.v + first + i) < least, zero, cuts), lit.cuts.v + first + i);
+        }
     }
 }
 
@@ -185,7 +205,8 @@ void join_sixteen(const Plan& plan, const LitSamples& pieces, int bits, LitSampl
 
 void inside_kernels_of(const lanes::StageWays& ways, lanes::StageKernels& kernels) {
     constexpr KnownRescales kNothing = KnownRescales::nothing;
-    kernels.gather_ends = &gather_turning_ends;
+    kernels.gather_ends = &gather_slab_ends;
+    kernels.add_ends = &add_slab_ends;
     kernels.pick_by_cuts = &pick_by_cuts;
     lanes::with_word<Lanes, kNothing>(ways.location,
                                       [&]<class L>() { kernels.place_between = &place_between<L>; });

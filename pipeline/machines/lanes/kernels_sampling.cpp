@@ -95,7 +95,7 @@ void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int
 }
 
 template <class L>
-void step_rows_aside(const Plan& plan, const lanes::LitSamples& lit, int end, int axis, bool ahead, int rows,
+void step_rows_aside(const Plan& plan, const lanes::LitSamples& lit, int axis, bool ahead, int rows,
                      lanes::Samples& out) {
     const LocationStage stage = plan.location;
     for (int at = 0; at < rows * kRays; at += static_cast<int>(L::count())) {
@@ -103,7 +103,7 @@ void step_rows_aside(const Plan& plan, const lanes::LitSamples& lit, int end, in
         for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
             // Behind the last sample stands anything.
             location[a] =
-                clamp(load<L>(lit.location[end][a].v + at), constant<L>(0), constant<L>(stage.limit[a]));
+                clamp(load<L>(lit.location[0][a].v + at), constant<L>(0), constant<L>(stage.limit[a]));
         });
         L& moved = location[static_cast<std::size_t>(axis)];
         moved = beside(stage, moved, axis, ahead);

@@ -71,84 +71,46 @@ HWY_INLINE std::array<L, 3> load_three(const lanes::Batch (&from)[3], int at) {
 }
 
 template <class L, bool kPlain>
-HWY_INLINE std::array<L, 3> stored_gradient(const GradientStage& s, const lanes::LitSamples& lit, int end,
-                                            int at) {
+HWY_INLINE std::array<L, 3> stored_gradient(const GradientStage& s, const lanes::LitSamples& lit, int at) {
     if (s.rule == GradientRule::central_samples) {
         const auto between = [&](int axis) SQUINT_WRITTEN_OUT {
-            const auto& scalars = lit.beside[end][axis];
+            const auto& scalars = lit.beside[axis];
             const L behind = load<L>(scalars[0].v + at), ahead = load<L>(scalars[1].v + at);
             return to_world(s, sample_difference(s, ahead, behind), axis);
         };
         return {between(0), between(1), between(2)};
     }
-    const StoredNeighbourhood<L, kPlain> near{lit.pair[end], at, s.rule == GradientRule::central};
-    const std::array<L, 3> weight = load_three<L>(lit.weight[end], at);
+    const StoredNeighbourhood<L, kPlain> near{lit.pair, at, s.rule == GradientRule::central};
+    const std::array<L, 3> weight = load_three<L>(lit.weight, at);
     const auto along = [&](int axis) SQUINT_WRITTEN_OUT {
         return to_world(s, voxel_difference(s, near, weight, axis), axis);
     };
     return {along(0), along(1), along(2)};
 }
 
-/// The raw gradient of a slab: of its sample, or the sum of its two ends'.
-template <class W, bool kPlain>
-HWY_INLINE std::array<W, 3> slab_gradient(const GradientStage& stage, bool both_ends,
-                                          const lanes::LitSamples& lit, int at) {
-    std::array<W, 3> gradient = stored_gradient<W, kPlain>(stage, lit, 0, at);
-    if (both_ends) {
-        const std::array<W, 3> other = stored_gradient<W, kPlain>(stage, lit, 1, at);
-        for (std::size_t a = 0; a < 3; ++a) gradient[a] = gradient[a] + other[a];
-    }
-    return gradient;
-}
-
-/// Stage 3's first half, of the first `count` samples.  A function of its own, so that it is compiled once for
-/// whatever words normals have.
-template <class G, bool kPlain>
-HWY_NOINLINE void store_gradients(const Plan& plan, int count, lanes::LitSamples& lit) {
-    GradientStage stage = plan.gradient;
-    if constexpr (kPlain) take_as_plain(stage);
-    const bool both_ends = plan.gradients_a_slab() == 2;
-    for (int at = 0; at < count; at += static_cast<int>(G::count())) {
-        const std::array<G, 3> gradient = slab_gradient<G, kPlain>(stage, both_ends, lit, at);
-        for (std::size_t a = 0; a < 3; ++a) store(gradient[a], lit.gradient[a].v + at);
-    }
-}
-
-/// Stage 3: the raw gradient of slabs, of their samples or the sum of their two ends', and the normal.
-/// G: the lanes of the raw gradient, whose lerps may need wider ones than all that follows: it passes through
-/// 32-bit words, which hold whatever 32-bit lanes do.  Loops apart, for each vector's way through them is one
-/// long chain: in a loop of its own the next vectors' run beside it.
-template <class G, class L, bool kPlain>
-void find_normals(const Plan& plan, int count, lanes::LitSamples& lit) {
-    GradientStage stage = plan.gradient;
-    if constexpr (kPlain) take_as_plain(stage);
-    // 64-bit lanes' gradients need not fit 32-bit words.
-    constexpr bool kStored = !std::is_same_v<L, Lanes<std::int64_t>>;
-    if constexpr (kStored) {
-        // To the end of the widest vector, which the loop behind reads whole.
-        constexpr int kStep = static_cast<int>(std::max(G::count(), L::count()));
-        store_gradients<G, kPlain>(plan, (count + kStep - 1) / kStep * kStep, lit);
-    }
-    for (int at = 0; at < count; at += static_cast<int>(L::count())) {
-        std::array<L, 3> gradient;
-        if constexpr (kStored)
-            gradient = load_three<L>(lit.gradient, at);
-        else
-            gradient = slab_gradient<L, kPlain>(stage, plan.gradients_a_slab() == 2, lit, at);
-        const std::array<L, 3> normal = normalise(stage, gradient);
-        for (std::size_t a = 0; a < 3; ++a) store(normal[a], lit.normal[a].v + at);
-        if (stage.fades) store(confidence(stage, gradient), lit.confidence.v + at);
-    }
-}
-
-/// Raw gradients alone, as 32-bit words.
+/// Stage 3's first half: raw gradients, as 32-bit words.  G: lanes whose lerps may need to be wider than all
+/// that follows.  Loops apart, for each vector's way through them is one long chain: in a loop of its own the
+/// next vectors' run beside it.
 template <class G, bool kPlain>
 void find_gradients(const Plan& plan, int count, lanes::LitSamples& lit) {
     GradientStage stage = plan.gradient;
     if constexpr (kPlain) take_as_plain(stage);
     for (int at = 0; at < count; at += static_cast<int>(G::count())) {
-        const std::array<G, 3> gradient = stored_gradient<G, kPlain>(stage, lit, 0, at);
+        const std::array<G, 3> gradient = stored_gradient<G, kPlain>(stage, lit, at);
         for (std::size_t a = 0; a < 3; ++a) store(gradient[a], lit.gradient[a].v + at);
+    }
+}
+
+/// Its second half: normals.
+template <class L, bool kPlain>
+void find_normals(const Plan& plan, int count, lanes::LitSamples& lit) {
+    GradientStage stage = plan.gradient;
+    if constexpr (kPlain) take_as_plain(stage);
+    for (int at = 0; at < count; at += static_cast<int>(L::count())) {
+        const std::array<L, 3> gradient = load_three<L>(lit.gradient, at);
+        const std::array<L, 3> normal = normalise(stage, gradient);
+        for (std::size_t a = 0; a < 3; ++a) store(normal[a], lit.normal[a].v + at);
+        if (stage.fades) store(confidence(stage, gradient), lit.confidence.v + at);
     }
 }
 
@@ -199,26 +161,25 @@ void shade_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
 void shading_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::StageKernels& kernels) {
     if (ways.gradient.is_float) {
         using L = Lanes<float, KnownRescales::nothing>;
-        kernels.find_normals = &find_normals<L, L, false>;
         kernels.find_gradients = &find_gradients<L, false>;
+        kernels.find_normals = &find_normals<L, false>;
         kernels.shade = &shade_samples<L, false>;
         return;
     }
     constexpr KnownRescales kEven = KnownRescales::halves_to_even;
+    const bool plain_gradient = is_plain(plan.gradient, *plan.volume);
     lanes::with_integer_word<Lanes, kEven>(ways.gradient, [&]<class G>() {
         kernels.find_gradients = &find_gradients<G, false>;
         if constexpr (std::is_same_v<G, Lanes<std::int32_t, kEven>>)
-            if (is_plain(plan.gradient, *plan.volume)) kernels.find_gradients = &find_gradients<G, true>;
-        lanes::with_integer_word<Lanes, kEven>(ways.shading, [&]<class L>() {
-            kernels.find_normals = &find_normals<G, L, false>;
-            if constexpr (std::is_same_v<G, Lanes<std::int32_t, kEven>> && std::is_same_v<L, G>)
-                if (is_plain(plan.gradient, *plan.volume)) kernels.find_normals = &find_normals<G, L, true>;
-        });
+            if (plain_gradient) kernels.find_gradients = &find_gradients<G, true>;
     });
     lanes::with_integer_word<Lanes, kEven>(ways.shading, [&]<class L>() {
+        kernels.find_normals = &find_normals<L, false>;
         kernels.shade = &shade_samples<L, false>;
-        if constexpr (std::is_same_v<L, Lanes<std::int32_t, kEven>>)
+        if constexpr (std::is_same_v<L, Lanes<std::int32_t, kEven>>) {
+            if (plain_gradient) kernels.find_normals = &find_normals<L, true>;
             if (is_plain(plan.shading)) kernels.shade = &shade_samples<L, true>;
+        }
     });
 }
 

@@ -157,7 +157,8 @@ int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, int steps
     const hn::ScalableTag<Word> d;
     const auto zero = hn::Zero(d);
     const bool per_ray = plan.shading.needs_ray(), locations = plan.keeps_locations();
-    const bool adaptive = plan.inside.rule == InsideRule::adaptive;
+    const bool adaptive = plan.inside.rule == InsideRule::adaptive, between = plan.inside.samples_between();
+    const bool places = between || !plan.shares_ends();
     int count = 0;
     for (int at = 0; at < steps * kRays; at += kLanes) {
         const int r = at % kRays;
@@ -170,15 +171,14 @@ int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, int steps
             packing(hn::Load(d, from), to.v + count);
         };
         packing(hn::Iota(d, at), lit.from.v + count);
-        for (int end = 0; end < (plan.inside.needs_back() ? 2 : 1); ++end)
-            for (int a = 0; a < 3; ++a) {
-                if (locations) {
-                    pack(s.location[a].v + at + end * kRays, lit.location[end][a]);
-                    continue;
-                }
-                pack(s.cell[a].v + at + end * kRays, lit.cell[end][a]);
-                pack(s.weight[a].v + at + end * kRays, lit.weight[end][a]);
+        for (int a = 0; places && a < 3; ++a) {
+            if (!locations) {
+                pack(s.cell[a].v + at, lit.cell[a]), pack(s.weight[a].v + at, lit.weight[a]);
+                continue;
             }
+            pack(s.location[a].v + at, lit.location[0][a]);
+            if (between) pack(s.location[a].v + at + kRays, lit.location[1][a]);
+        }
         for (int c = 0; c < 3; ++c) pack(s.color[c].v + at, lit.color[c]);
         pack(s.alpha.v + at, lit.alpha);
         if (adaptive) {
@@ -263,75 +263,74 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
     const auto clamped = [](std::int64_t i, std::int64_t end) {
         return std::clamp<std::int64_t>(i, 0, end - 1);
     };
-    for (int end = 0; end < plan.gradients_a_slab(); ++end)
-        for (int at = 0; at < count; at += kLanes) {
-            lanes::Batch* pair = lit.pair[end];
-            const auto& cell = lit.cell[end];
-            auto outside = hn::Lt(hn::Load(d, cell[0].v + at), hn::Set(d, 1));
-            for (int a = 0; a < 3; ++a) {
-                const auto p = hn::Load(d, cell[a].v + at);
-                outside = hn::Or(outside, hn::Or(hn::Lt(p, hn::Set(d, 1)),
-                                                 hn::Gt(p, hn::Set(d, static_cast<Word>(n[a] - 3)))));
-            }
-            const int here = std::min(kLanes, count - at);  // lanes behind the last sample repeat the first
-            outside = hn::And(outside, hn::FirstN(d, static_cast<std::size_t>(here)));
-            if (hn::AllFalse(d, outside)) {
-                if (kGathersRows && offsets_fit) {
-                    auto first = hn::Sub(hn::Load(d, cell[2].v + at), hn::Set(d, 1));
-                    for (const int a : {1, 0})
-                        first = hn::Add(hn::Mul(first, hn::Set(d, static_cast<Word>(n[a]))),
-                                        hn::Sub(hn::Load(d, cell[a].v + at), hn::Set(d, 1)));
-                    // Lanes behind the last sample look at the first voxel.
-                    first = hn::IfThenElseZero(hn::FirstN(d, static_cast<std::size_t>(here)), first);
-                    for (int row = 0; row < 16; ++row) {
-                        if (!(rows >> row & 1)) continue;
-                        const T* line = data + n.x * (row % 4 + n.y * (row / 4));
-                        if (wants_inner(row)) {
-                            hn::Store(gathered_inner_pair(line, first), d, pair[2 * row].v + at);
-                            continue;
-                        }
-                        const std::array<Words, 2> two = gathered_row(line, first);
-                        hn::Store(two[0], d, pair[2 * row].v + at);
-                        hn::Store(two[1], d, pair[2 * row + 1].v + at);
-                    }
-                    continue;
-                }
-                const T* low[kLanes];
-                for (int lane = 0; lane < kLanes; ++lane) {
-                    const int i = lane < here ? at + lane : at;
-                    low[lane] = data + (cell[0].v[i] - 1) +
-                                n.x * ((cell[1].v[i] - 1) + n.y * std::int64_t{cell[2].v[i] - 1});
-                }
+    for (int at = 0; at < count; at += kLanes) {
+        lanes::Batch* pair = lit.pair;
+        const auto& cell = lit.cell;
+        auto outside = hn::Lt(hn::Load(d, cell[0].v + at), hn::Set(d, 1));
+        for (int a = 0; a < 3; ++a) {
+            const auto p = hn::Load(d, cell[a].v + at);
+            outside = hn::Or(outside, hn::Or(hn::Lt(p, hn::Set(d, 1)),
+                                             hn::Gt(p, hn::Set(d, static_cast<Word>(n[a] - 3)))));
+        }
+        const int here = std::min(kLanes, count - at);  // lanes behind the last sample repeat the first
+        outside = hn::And(outside, hn::FirstN(d, static_cast<std::size_t>(here)));
+        if (hn::AllFalse(d, outside)) {
+            if (kGathersRows && offsets_fit) {
+                auto first = hn::Sub(hn::Load(d, cell[2].v + at), hn::Set(d, 1));
+                for (const int a : {1, 0})
+                    first = hn::Add(hn::Mul(first, hn::Set(d, static_cast<Word>(n[a]))),
+                                    hn::Sub(hn::Load(d, cell[a].v + at), hn::Set(d, 1)));
+                // Lanes behind the last sample look at the first voxel.
+                first = hn::IfThenElseZero(hn::FirstN(d, static_cast<std::size_t>(here)), first);
                 for (int row = 0; row < 16; ++row) {
                     if (!(rows >> row & 1)) continue;
-                    const std::int64_t offset = n.x * (row % 4 + n.y * (row / 4));
-                    const auto address = [&](int lane) {
-                        return reinterpret_cast<const std::uint8_t*>(low[lane] + offset);
-                    };
-                    const auto words = [&] {
-                        if constexpr (sizeof(T) == 1)
-                            return load_widened_quads(address);
-                        else
-                            return load_quads(address);
-                    }();
-                    const bool inner = wants_inner(row);
-                    hn::Store(inner ? inner_pair(words[0], words[1]) : words[0], d, pair[2 * row].v + at);
-                    hn::Store(words[1], d, pair[2 * row + 1].v + at);
+                    const T* line = data + n.x * (row % 4 + n.y * (row / 4));
+                    if (wants_inner(row)) {
+                        hn::Store(gathered_inner_pair(line, first), d, pair[2 * row].v + at);
+                        continue;
+                    }
+                    const std::array<Words, 2> two = gathered_row(line, first);
+                    hn::Store(two[0], d, pair[2 * row].v + at);
+                    hn::Store(two[1], d, pair[2 * row + 1].v + at);
                 }
                 continue;
             }
-            // Beside the volume's faces its outermost voxels go on.
-            for (int i = at; i < at + here; ++i)
-                for (int row = 0; row < 16; ++row) {
-                    if (!(rows >> row & 1)) continue;
-                    const T* line = data + n.x * (clamped(cell[1].v[i] + row % 4 - 1, n.y) +
-                                                  n.y * clamped(cell[2].v[i] + row / 4 - 1, n.z));
-                    const auto voxel = [&](int x) { return Word{line[clamped(cell[0].v[i] + x - 1, n.x)]}; };
-                    const bool inner = wants_inner(row);
-                    pair[2 * row].v[i] = inner ? voxel(1) | voxel(2) << 16 : voxel(0) | voxel(1) << 16;
-                    pair[2 * row + 1].v[i] = voxel(2) | voxel(3) << 16;
-                }
+            const T* low[kLanes];
+            for (int lane = 0; lane < kLanes; ++lane) {
+                const int i = lane < here ? at + lane : at;
+                low[lane] = data + (cell[0].v[i] - 1) +
+                            n.x * ((cell[1].v[i] - 1) + n.y * std::int64_t{cell[2].v[i] - 1});
+            }
+            for (int row = 0; row < 16; ++row) {
+                if (!(rows >> row & 1)) continue;
+                const std::int64_t offset = n.x * (row % 4 + n.y * (row / 4));
+                const auto address = [&](int lane) {
+                    return reinterpret_cast<const std::uint8_t*>(low[lane] + offset);
+                };
+                const auto words = [&] {
+                    if constexpr (sizeof(T) == 1)
+                        return load_widened_quads(address);
+                    else
+                        return load_quads(address);
+                }();
+                const bool inner = wants_inner(row);
+                hn::Store(inner ? inner_pair(words[0], words[1]) : words[0], d, pair[2 * row].v + at);
+                hn::Store(words[1], d, pair[2 * row + 1].v + at);
+            }
+            continue;
         }
+        // Beside the volume's faces its outermost voxels go on.
+        for (int i = at; i < at + here; ++i)
+            for (int row = 0; row < 16; ++row) {
+                if (!(rows >> row & 1)) continue;
+                const T* line = data + n.x * (clamped(cell[1].v[i] + row % 4 - 1, n.y) +
+                                              n.y * clamped(cell[2].v[i] + row / 4 - 1, n.z));
+                const auto voxel = [&](int x) { return Word{line[clamped(cell[0].v[i] + x - 1, n.x)]}; };
+                const bool inner = wants_inner(row);
+                pair[2 * row].v[i] = inner ? voxel(1) | voxel(2) << 16 : voxel(0) | voxel(1) << 16;
+                pair[2 * row + 1].v[i] = voxel(2) | voxel(3) << 16;
+            }
+    }
 }
 
 // ------------------------------------------------------------------------------------- empty space

@@ -169,8 +169,6 @@ StageWays ways_of(const Plan& plan) {
 
 std::optional<std::string> what_needs_the_model(const Plan& plan) {
     if (plan.real && !plan.float32) return "nothing is rounded";
-    // The kernels for it are there (kernels_inside.cpp), and not yet held against the model.
-    if (plan.inside.rule == InsideRule::adaptive) return "slabs in pieces are lit by the model";
     if (plan.float32) {  // formats do not matter
         if (plan.projection_mode) return "mip, minip and average of floats run in the model";
         if (plan.scene.output.depth || plan.scene.output.normals)
@@ -204,13 +202,16 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
     if (plan.lit) stored.push_back(Wire::normal);
     if (plan.gradient.fades) stored.push_back(Wire::confidence);
     if (plan.gradient_from_samples()) stored.push_back(Wire::sample);
-    if (plan.inside.rule == InsideRule::adaptive) stored.push_back(Wire::gradient);
-    for (const Wire wire : stored) {
+    const auto most_bits = [&](Wire wire, int bits) -> std::optional<std::string> {
         const Format& f = plan.specs[wire].format;
-        if (f.integer_bits + f.fraction_bits > 31)
-            return fmt::format("{}: {} is wider than a lane's 31 bits and sign", info(wire).name,
-                               to_string(f));
-    }
+        if (f.integer_bits + f.fraction_bits <= bits) return std::nullopt;
+        return fmt::format("{}: {} is wider than a lane's {} bits and sign", info(wire).name, to_string(f),
+                           bits);
+    };
+    for (const Wire wire : stored)
+        if (const auto obstacle = most_bits(wire, 31)) return obstacle;
+    if (plan.lit)  // sums of a slab's ends have a bit more
+        if (const auto obstacle = most_bits(Wire::gradient, plan.shares_ends() ? 30 : 31)) return obstacle;
     return std::nullopt;
 }
 
@@ -297,10 +298,8 @@ void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& 
     const auto workspace = std::make_unique_for_overwrite<Workspace>();
     Workspace& w = *workspace;
     if (plan_.lit) w.lit = {};  // lanes behind the last gathered sample are computed, too
-    if (plan_.inside.rule == InsideRule::adaptive) {
-        w.ends = w.picked = w.pieces = {}, w.cut = {};
-        for (Batch& component : w.end_gradient) component = {};
-    }
+    if (plan_.shares_ends()) w.ends = {}, w.end_gradients = {};
+    if (plan_.inside.rule == InsideRule::adaptive) w.picked = w.pieces = {}, w.cut = {};
     PacketLoop loop(plan_, kernels_, voxels_, empty_.get(), w);
     const bool colors_alone = !plan_.projection_mode && image.channels.size() == 4;
     for (int y = top; y < bottom; y += kSide)

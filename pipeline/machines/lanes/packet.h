@@ -77,20 +77,26 @@ struct alignas(64) Samples {
 
 /// Samples to be lit, gathered from a batch: dense, so that transparent ones cost nothing.
 struct alignas(64) LitSamples {
-    Batch from;                      // place in the batch
-    Batch cell[2][3], weight[2][3];  // of the front sample, and of the back one where a slab has two
+    Batch from;                // place in the batch
+    Batch cell[3], weight[3];  // where a gradient is taken
     // The 4x4x4 voxels about its cell, by pairs along x; for central differences alone, of outer rows the
     // inner pair, in place of the first.
-    Batch pair[2][32];
-    Batch location[2][3];   // in place of cell and weight, of a gradient from samples or between ends
-    Batch beside[2][3][2];  // scalars one voxel off along each axis: behind, ahead
+    Batch pair[32];
+    Batch location[2][3];  // of the front and the back: where gradients are made of samples, or between ends
+    Batch beside[3][2];    // scalars one voxel off along each axis: behind, ahead
     Batch half[kMostHalves][3], view[3];
-    Batch gradient[3];  // raw; the sum of a slab's two ends
+    Batch gradient[3];  // raw; the sum of those at a slab's two ends
     Batch normal[3];
     Batch confidence;  // where light fades in
     Batch color[3], alpha;
     // Where slabs may be cut: inputs at both ends, length, and log2 of the pieces.
     Batch input[2], length, cuts;
+};
+
+/// Raw gradients at slabs' ends, by place in the batch.
+struct alignas(64) EndGradients {
+    Batch component[3];
+    Row known;  // 1 where row 0 has one, from the batch in front
 };
 
 /// Whether a row of four voxels, of the 4x4 about a cell, holds none of the cell's corners.

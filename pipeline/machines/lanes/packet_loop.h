@@ -40,6 +40,7 @@ inline bool any_active(const PixelPacket& pixels) {
 struct Notes {
     Batch between;                     // T at the ends of a batch's slabs
     Row samples_before;                // of the batch
+    Batch in_pieces, normal[3];        // where a slab was lit so, and its first visible piece's
     Pixel<std::int64_t> pixel[kRays];  // depths, and the first visible slab's normal
     bool met[kRays];                   // something lit, and so visible
 };
@@ -52,10 +53,9 @@ struct Workspace {
     ProjectionPacket projection;
     Samples samples[2];  // this batch, and the next one's locations
     LitSamples lit;
-    // Slabs that are lit in pieces: their ends and the gradients there, those of one number of pieces, and
-    // their pieces.
-    LitSamples ends, picked, pieces;
-    Batch end_gradient[3];
+    LitSamples ends;  // of slabs that are lit by the gradients there
+    EndGradients end_gradients;
+    LitSamples picked, pieces;  // slabs that are lit in one number of pieces, and those
     Samples cut;
     Samples beside;  // those that a gradient is made of
     Notes notes;
@@ -190,6 +190,8 @@ class PacketLoop {
             return;
         }
         kernels_.classify(plan_, rows.count, s);
+        if (!carried) w_.end_gradients.known = {};
+        if (notes_) w_.notes.in_pieces = {};
         const int lit = plan_.lit ? light(rows.count) : 0;
         if (notes_) w_.notes.samples_before = w_.pixels.samples;
         kernels_.composite(plan_, w_.rays, rows.count, s, w_.pixels, w_.notes.between);
@@ -218,6 +220,8 @@ class PacketLoop {
         move(from.input, to.input), move(from.length, to.length);
         for (int a = 0; a < 3; ++a) move(from.cell[a], to.cell[a]), move(from.weight[a], to.weight[a]);
         for (int a = 0; plan_.keeps_locations() && a < 3; ++a) move(from.location[a], to.location[a]);
+        for (Batch& end : w_.end_gradients.component)
+            if (plan_.shares_ends()) move(end, end);
     }
 
     // Gathers what is visible and not yet hidden, lights it, and puts it back.  Gives its number.
@@ -226,23 +230,38 @@ class PacketLoop {
         LitSamples& lit = w_.lit;
         if (!backwards_) kernels_.hide(plan_, w_.rays, w_.pixels, steps, s);
         const int count = kernels_.gather_lit(plan_, w_.rays, steps, s, lit);
+        if (plan_.shares_ends()) find_end_gradients(steps);
         if (count == 0) return 0;
-        if (plan_.inside.rule == InsideRule::adaptive) {
-            light_as_it_turns(steps, count);
-            return count;
-        }
         if (plan_.inside.rule == InsideRule::middle)
             kernels_.place_between(plan_, lit, 0, count, 1, 1, lit, 0);
+        if (plan_.shares_ends())
+            kernels_.add_ends(plan_, count, w_.end_gradients, lit);
+        else
+            find_gradients(count, lit);
         shade(count, lit);
         put_back(count, lit);
+        if (plan_.inside.rule == InsideRule::adaptive) light_as_it_turns(count);
         return count;
     }
 
-    // Stages 3 and 5 of gathered places.
-    void shade(int count, LitSamples& lit) {
+    // Stage 3's first half at gathered places.
+    void find_gradients(int count, LitSamples& lit) {
         look_around(count, lit);
+        kernels_.find_gradients(plan_, count, lit);
+    }
+    // Its second half, and stage 5.
+    void shade(int count, LitSamples& lit) {
         kernels_.find_normals(plan_, count, lit);
         kernels_.shade(plan_, count, lit);
+    }
+    // The gradients at the ends of slabs to be lit, each computed once for both slabs beside it.
+    void find_end_gradients(int steps) {
+        const int ends = kernels_.gather_ends(plan_, w_.rays, steps, here(), w_.end_gradients.known, w_.ends);
+        if (ends == 0) return;
+        find_gradients(ends, w_.ends);
+        for (int i = 0; i < ends; ++i)
+            for (int a = 0; a < 3; ++a)
+                w_.end_gradients.component[a].v[w_.ends.from.v[i]] = w_.ends.gradient[a].v[i];
     }
     void put_back(int count, const LitSamples& lit) {
         Samples& s = here();
@@ -250,25 +269,13 @@ class PacketLoop {
             for (int c = 0; c < 3; ++c) s.color[c].v[lit.from.v[i]] = lit.color[c].v[i];
     }
 
-    // In 1, 2 or 4 pieces by the angle between the gradients at a slab's ends, which are computed once for
-    // both slabs beside them.
-    void light_as_it_turns(int steps, int count) {
-        const int ends = kernels_.gather_ends(plan_, w_.rays, steps, here(), w_.ends);
-        if (ends > 0) {
-            look_around(ends, w_.ends);
-            kernels_.find_gradients(plan_, ends, w_.ends);
-        }
-        for (int i = 0; i < ends; ++i)
-            for (int a = 0; a < 3; ++a) w_.end_gradient[a].v[w_.ends.from.v[i]] = w_.ends.gradient[a].v[i];
-        kernels_.find_cuts(plan_, count, w_.end_gradient, w_.lit);
-        for (int bits = 0; bits <= kMostCuts; ++bits) {
+    // Those that turn, once more, in 2 or 4 pieces.
+    void light_as_it_turns(int count) {
+        kernels_.find_cuts(plan_, count, w_.end_gradients, w_.lit);
+        for (int bits = 1; bits <= kMostCuts; ++bits) {
             const int many = kernels_.pick_by_cuts(plan_, count, bits, w_.lit, w_.picked);
             if (many == 0) continue;
-            if (bits == 0) {
-                kernels_.place_between(plan_, w_.picked, 0, many, 1, 1, w_.picked, 0);
-                shade(many, w_.picked);
-            }
-            for (int at = 0; bits > 0 && at < many; at += kRays) light_sixteen(at, bits);
+            for (int at = 0; at < many; at += kRays) light_sixteen(at, bits);
             put_back(many, w_.picked);
         }
     }
@@ -286,8 +293,35 @@ class PacketLoop {
                     std::copy_n(w_.picked.half[l][a].v + at, kRays, w_.pieces.half[l][a].v + to);
             }
         }
+        find_gradients(count, w_.pieces);
+        if (plan_.gradient.fades) double_gradients(count, w_.pieces);
         shade(count, w_.pieces);
         kernels_.join(plan_, w_.pieces, bits, w_.picked, at);
+        if (notes_) note_pieces(at, bits);
+    }
+
+    // A slab's normal is that of its first piece that is seen.
+    void note_pieces(int at, int bits) {
+        for (int r = 0; r < kRays; ++r) {
+            int piece = 0;
+            while (piece + 1 < 1 << bits && w_.pieces.alpha.v[piece * kRays + r] <= 0) ++piece;
+            const int place = w_.picked.from.v[at + r];
+            w_.notes.in_pieces.v[place] = 1;
+            for (int a = 0; a < 3; ++a)
+                w_.notes.normal[a].v[place] = w_.pieces.normal[a].v[piece * kRays + r];
+        }
+    }
+
+    // for_pieces of gathered gradients.
+    void double_gradients(int count, LitSamples& lit) const {
+        const auto twice = [&](auto word, Word& bits) {
+            word_from_bits(bits, word);
+            bits = bits_of(word + word);
+        };
+        for (int a = 0; a < 3; ++a)
+            for (int i = 0; i < count; ++i)
+                plan_.float32 ? twice(Real<float>{}, lit.gradient[a].v[i])
+                              : twice(std::int64_t{}, lit.gradient[a].v[i]);
     }
 
     // What the gradients of the first `count` gathered places are made of: voxels, or the six samples about
@@ -295,15 +329,14 @@ class PacketLoop {
     void look_around(int count, LitSamples& lit) {
         if (!plan_.gradient_from_samples()) return kernels_.fetch_lit(plan_, count, lit);
         const int rows = (count + kRays - 1) / kRays;
-        for (int end = 0; end < plan_.gradients_a_slab(); ++end)
-            for (int axis = 0; axis < 3; ++axis)
-                for (const bool ahead : {false, true}) {
-                    kernels_.step_aside(plan_, lit, end, axis, ahead, rows, w_.beside);
-                    kernels_.prefetch(voxels_, 0, rows, w_.beside);
-                    kernels_.fetch(voxels_, 0, rows, w_.beside);
-                    kernels_.interpolate_scalars(plan_, 0, rows, w_.beside);
-                    std::copy_n(w_.beside.input.v, rows * kRays, lit.beside[end][axis][ahead].v);
-                }
+        for (int axis = 0; axis < 3; ++axis)
+            for (const bool ahead : {false, true}) {
+                kernels_.step_aside(plan_, lit, axis, ahead, rows, w_.beside);
+                kernels_.prefetch(voxels_, 0, rows, w_.beside);
+                kernels_.fetch(voxels_, 0, rows, w_.beside);
+                kernels_.interpolate_scalars(plan_, 0, rows, w_.beside);
+                std::copy_n(w_.beside.input.v, rows * kRays, lit.beside[axis][ahead].v);
+            }
     }
 
     // Depths and first normals of the batch that has just been composited, `lit` samples of it lit.  A ray
@@ -316,7 +349,10 @@ class PacketLoop {
             const int place = backwards_ ? lit - 1 - i : i;  // as the ray meets them
             const int at = w_.lit.from.v[place], r = at % kRays;
             if (at / kRays >= taken[r] || (w_.notes.met[r] && !backwards_)) continue;
-            for (std::size_t a = 0; a < 3; ++a) w_.notes.pixel[r].first_normal[a] = w_.lit.normal[a].v[place];
+            const bool in_pieces = w_.notes.in_pieces.v[at] != 0;
+            for (std::size_t a = 0; a < 3; ++a)
+                w_.notes.pixel[r].first_normal[a] =
+                    in_pieces ? w_.notes.normal[a].v[at] : w_.lit.normal[a].v[place];
             w_.notes.met[r] = true;
         }
     }

@@ -101,7 +101,7 @@ class KernelChecker {
         const int back = plan_.needs_back ? 1 : 0, rows = kSteps + back;
         const auto add = [&](const char* kernel, auto draw, auto run, auto difference) {
             const bool lit = std::string_view(kernel) == "shade" ||
-                             std::string_view(kernel) == "fetch_lit and find_normals";
+                             std::string_view(kernel) == "fetch_lit, find_gradients and find_normals";
             all.push_back(
                 {kernel, draw, run, difference, [this, lit] { return lit ? count_ : kSteps * kRays; }});
         };
@@ -144,10 +144,24 @@ class KernelChecker {
             "gather_lit", [this] { draw_rays(), draw_slabs(), draw_cells(); },
             [this] { count_ = kernels_.gather_lit(plan_, rays_, kSteps, *samples_, *lit_); },
             [this] { return gather_difference(); });
+        if (plan_.shares_ends()) {
+            add(
+                "gather_ends", [this] { draw_rays(), draw_slabs(), draw_cells(), draw_known(); },
+                [this] {
+                    ends_.known = known_before_;
+                    count_ = kernels_.gather_ends(plan_, rays_, kSteps, *samples_, ends_.known, *lit_);
+                },
+                [this] { return ends_difference(); });
+            add(
+                "add_ends", [this] { draw_ends(); },
+                [this] { kernels_.add_ends(plan_, count_, ends_, *lit_); },
+                [this] { return sum_difference(); });
+        }
         add(
-            "fetch_lit and find_normals", [this] { draw_lit(); },
+            "fetch_lit, find_gradients and find_normals", [this] { draw_lit(); },
             [this] {
                 kernels_.fetch_lit(plan_, count_, *lit_);
+                kernels_.find_gradients(plan_, count_, *lit_);
                 kernels_.find_normals(plan_, count_, *lit_);
             },
             [this] { return normal_difference(); });
@@ -252,11 +266,20 @@ class KernelChecker {
     void draw_lit() {
         draw_rays();
         count_ = 1 + static_cast<int>(below(kSteps * kRays));
-        for (int end = 0; end < 2; ++end) {
-            for (int i = 0; i < kBatch; ++i)
-                for (std::size_t a = 0; a < 3; ++a)
-                    lit_->cell[end][a].v[i] = static_cast<Word>(up_to(plan_.location.last_cell[a]));
-            draw_weights(lit_->weight[end], kBatch);
+        for (int i = 0; i < kBatch; ++i)
+            for (std::size_t a = 0; a < 3; ++a)
+                lit_->cell[a].v[i] = static_cast<Word>(up_to(plan_.location.last_cell[a]));
+        draw_weights(lit_->weight, kBatch);
+    }
+    void draw_known() {
+        for (Word& known : known_before_.v) known = static_cast<Word>(below(2));
+    }
+    void draw_ends() {
+        count_ = 1 + static_cast<int>(below(kSteps * kRays));
+        for (int i = 0; i < kBatch; ++i) {
+            lit_->from.v[i] = static_cast<Word>(below(kSteps * kRays));
+            for (Batch& component : ends_.component)
+                component.v[i] = static_cast<Word>(below(1 << 30) - (1 << 29));
         }
     }
     void draw_lit_slabs() {
@@ -426,26 +449,54 @@ class KernelChecker {
             if (auto text = differs("alpha", count, samples_->alpha.v[i], lit_->alpha.v[count]);
                 !text.empty())
                 return text;
-            for (int a = 0; a < 3 && !plan_.gradient_from_samples(); ++a)
-                if (auto text = differs("cell", count, samples_->cell[a].v[i], lit_->cell[0][a].v[count]);
+            for (int a = 0; a < 3 && !plan_.keeps_locations() && !plan_.shares_ends(); ++a)
+                if (auto text = differs("cell", count, samples_->cell[a].v[i], lit_->cell[a].v[count]);
                     !text.empty())
                     return text;
             ++count;
         }
         return differs("count", 0, count, count_);
     }
+    std::string ends_difference() {
+        const auto seen = [&](int i) {
+            return 0 <= i && i < kSteps * kRays && samples_->alpha.v[i] > 0 &&
+                   samples_->first + i / kRays < rays_.slabs.v[i % kRays];
+        };
+        int count = 0;
+        for (int i = 0; i < (kSteps + 1) * kRays; ++i) {
+            const bool wanted = (seen(i) || seen(i - kRays)) && !(i < kRays && known_before_.v[i]);
+            if (i >= kSteps * kRays)
+                if (auto text = differs("known", i, wanted, ends_.known.v[i % kRays]); !text.empty())
+                    return text;
+            if (!wanted) continue;
+            if (count >= count_) break;
+            if (auto text = differs("place", count, i, lit_->from.v[count]); !text.empty()) return text;
+            for (int a = 0; a < 3 && !plan_.gradient_from_samples(); ++a)
+                if (auto text = differs("cell", count, samples_->cell[a].v[i], lit_->cell[a].v[count]);
+                    !text.empty())
+                    return text;
+            ++count;
+        }
+        return differs("count", 0, count, count_);
+    }
+    std::string sum_difference() {
+        return first_of(count_, [&](int i) {
+            return first_of(3, [&](int a) {
+                const Word* at = ends_.component[a].v + lit_->from.v[i];
+                return differs("sum", i, Integer{at[0]} + at[kRays], lit_->gradient[a].v[i]);
+            });
+        });
+    }
     std::string normal_difference() {
         using namespace squint::HWY_NAMESPACE;
         const FromVolume voxels{*plan_.volume};
         return first_of(count_, [&](int i) -> std::string {
-            L3 gradient{0, 0, 0};
-            for (int end = 0; end < (plan_.needs_back ? 2 : 1); ++end) {
-                const auto near = voxels.neighbourhood(three(lit_->cell[end], i));
-                const L3 weight = three(lit_->weight[end], i);
-                for (int a = 0; a < 3; ++a)
-                    gradient[static_cast<std::size_t>(a)] +=
-                        to_world(plan_.gradient, voxel_difference(plan_.gradient, near, weight, a), a);
-            }
+            const auto near = voxels.neighbourhood(three(lit_->cell, i));
+            const L3 weight = three(lit_->weight, i);
+            L3 gradient;
+            for (int a = 0; a < 3; ++a)
+                gradient[static_cast<std::size_t>(a)] =
+                    to_world(plan_.gradient, voxel_difference(plan_.gradient, near, weight, a), a);
             const L3 normal = normalise(plan_.gradient, gradient);
             return first_of(3, [&](int a) {
                 return differs("normal", i, normal[static_cast<std::size_t>(a)], lit_->normal[a].v[i]);
@@ -477,6 +528,8 @@ class KernelChecker {
     Batch between_{};
     std::unique_ptr<Samples> samples_ = std::make_unique<Samples>();
     Samples before_{};
+    EndGradients ends_{};
+    Row known_before_{};
     std::unique_ptr<LitSamples> lit_ = std::make_unique<LitSamples>(),
                                 lit_before_ = std::make_unique<LitSamples>();
     int count_ = 0;
