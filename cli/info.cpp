@@ -59,7 +59,11 @@ std::string info_text(const Volume& v) {
     line("type",
          fmt::format("{}, levels of {} bits", v.type == ScalarType::u8 ? "u8" : "u16", v.scalar_bits));
     line("spacing", fmt::format("{:g} {:g} {:g}", v.spacing.x, v.spacing.y, v.spacing.z));
-    line("origin", fmt::format("{:g} {:g} {:g}", v.origin.x, v.origin.y, v.origin.z));
+    const Vec3 origin = v.world_from_voxel(Vec3(0));
+    line("origin", fmt::format("{:g} {:g} {:g}", origin.x, origin.y, origin.z));
+    for (std::size_t a = 0; v.turned() && a < 3; ++a)
+        line(fmt::format("along {}", "xyz"[a]).c_str(),
+             fmt::format("{:.6f} {:.6f} {:.6f}", v.turn[a].x, v.turn[a].y, v.turn[a].z));
     if (!v.space.empty()) line("axes", v.space + (v.modality.empty() ? "" : ", " + v.modality));
     line("scalars", fmt::format("{} to {}", v.smallest, v.largest));
     line("values", fmt::format("{:g} to {:g} (value = {:g} * scalar + {:g})",

@@ -86,12 +86,18 @@ void check(const CameraSettings& settings, int width, int height) {
 
 /// The distance from center to the farthest corner of the volume: every turn stays within that ball.
 double framing_radius(const Volume& volume, const Vec3& center) {
-    const Vec3 low = volume.box_low() - center, high = volume.box_high() - center;
+    const Vec3 at = volume.grid_from_world(center);
+    const Vec3 low = volume.box_low() - at, high = volume.box_high() - at;
     const Vec3 farthest(std::max(std::fabs(low.x), std::fabs(high.x)),
                         std::max(std::fabs(low.y), std::fabs(high.y)),
                         std::max(std::fabs(low.z), std::fabs(high.z)));
     return std::max(length(farthest),
                     volume.smallest_spacing());  // a volume of one voxel has a picture, too
+}
+
+HWY_NAMESPACE::RayOf<double> words_of(const Ray& ray) {
+    const Vec3 &o = ray.origin, &d = ray.direction;
+    return {{o.x, o.y, o.z}, {d.x, d.y, d.z}};
 }
 
 }  // namespace
@@ -156,6 +162,13 @@ Camera make_camera(const CameraSettings& settings, const Volume& volume, int wid
     return camera;
 }
 
+Camera in_grid_space(const Camera& world, const Volume& volume) {
+    Camera camera = world;
+    for (Vec3* v : {&camera.eye, &camera.center, &camera.view, &camera.right, &camera.up})
+        *v = volume.grid_from_world(*v);
+    return camera;
+}
+
 Ray Camera::ray(int column, int row) const {
     const auto ray = HWY_NAMESPACE::ray_through<double>(*this, column, row);
     return {Vec3(ray.origin[0], ray.origin[1], ray.origin[2]),
@@ -163,9 +176,15 @@ Ray Camera::ray(int column, int row) const {
 }
 
 Interval intersect(const Ray& ray, const Vec3& low, const Vec3& high) {
-    const Vec3 &o = ray.origin, &d = ray.direction;
-    const auto inside = HWY_NAMESPACE::intersect_box<double>({{o.x, o.y, o.z}, {d.x, d.y, d.z}}, low, high);
+    const auto inside = HWY_NAMESPACE::intersect_box(words_of(ray), low, high);
     return {inside.first, inside.last};
+}
+Interval intersect(const Ray& ray, const TurnedBox& box) {
+    const auto inside = HWY_NAMESPACE::intersect_turned_box(words_of(ray), box);
+    return {inside.first, inside.last};
+}
+Interval common(const Interval& a, const Interval& b) {
+    return {std::max(a.first, b.first), std::min(a.last, b.last)};
 }
 
 }  // namespace squint

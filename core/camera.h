@@ -4,6 +4,7 @@
 #include "core/vector.h"
 #include "core/volume.h"
 
+#include <array>
 #include <optional>
 
 namespace squint {
@@ -24,11 +25,12 @@ struct CameraSettings {
 };
 
 struct Ray {
-    Vec3 origin;     // world
+    Vec3 origin;
     Vec3 direction;  // unit length
 };
 
-/// A camera with all settings decided.  ray() uses only + - * / and sqrt: the same bits on every CPU.
+/// A camera with all settings decided, in world or in grid space.  ray() uses only + - * / and sqrt: the same bits
+/// on every CPU.
 struct Camera {
     Projection projection = Projection::orthographic;
     Vec3 eye, center;
@@ -39,9 +41,12 @@ struct Camera {
     Ray ray(int column, int row) const;  // through the pixel's centre; row 0 is the top
 };
 
-/// Throws InputError: eye equals center, up is parallel to the view, height or fov_y is out of range.
+/// In world space.  Throws InputError: eye equals center, up is parallel to the view, height or fov_y is out of
+/// range.
 Camera make_camera(const CameraSettings& settings, const Volume& volume, int width, int height,
                    int frame = 0);
+/// The same camera in a volume's grid space.
+Camera in_grid_space(const Camera& world, const Volume& volume);
 
 /// The part of a ray inside a box [low, high], as distances along the ray.  It is empty when first >= last; a
 /// chord of length zero is empty.
@@ -50,5 +55,14 @@ struct Interval {
     bool empty() const { return !(first < last); }
 };
 Interval intersect(const Ray& ray, const Vec3& low, const Vec3& high);
+
+/// A box along axes of its own: unit vectors in the space of the rays that it cuts, and two of its corners, by
+/// distances along them.
+struct TurnedBox {
+    std::array<Vec3, 3> axes;
+    Vec3 low, high;
+};
+Interval intersect(const Ray& ray, const TurnedBox& box);
+Interval common(const Interval& a, const Interval& b);
 
 }  // namespace squint

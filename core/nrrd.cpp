@@ -364,15 +364,16 @@ StoredVolume read_nrrd(const std::string& path, const MappedFile& file, const Lo
 }
 
 void save_nrrd(const Volume& volume, const std::string& path) {
-    const Vec3 &s = volume.spacing, &o = volume.origin;
+    const Vec3 &s = volume.spacing, o = volume.world_from_voxel(Vec3(0));
+    const Vec3 x = volume.turn[0] * s.x, y = volume.turn[1] * s.y, z = volume.turn[2] * s.z;
     std::string header = fmt::format(
         "NRRD0004\n# written by squint\ntype: {}\ndimension: 3\nspace dimension: 3\nsizes: {} {} {}\n"
-        "space directions: ({},0,0) (0,{},0) (0,0,{})\nkinds: domain domain domain\nendian: "
+        "space directions: ({},{},{}) ({},{},{}) ({},{},{})\nkinds: domain domain domain\nendian: "
         "little\nencoding: raw\n"
         "space origin: ({},{},{})\n{}:={}\n{}:={}\n{}:={}\n",
-        volume.type == ScalarType::u8 ? "uchar" : "ushort", volume.dims.x, volume.dims.y, volume.dims.z, s.x,
-        s.y, s.z, o.x, o.y, o.z, kScaleKey, volume.value_scale, kOffsetKey, volume.value_offset, kBitsKey,
-        volume.scalar_bits);
+        volume.type == ScalarType::u8 ? "uchar" : "ushort", volume.dims.x, volume.dims.y, volume.dims.z, x.x,
+        x.y, x.z, y.x, y.y, y.z, z.x, z.y, z.z, o.x, o.y, o.z, kScaleKey, volume.value_scale, kOffsetKey,
+        volume.value_offset, kBitsKey, volume.scalar_bits);
     // A comment pads the header: voxels that begin at a multiple of 64 can be mapped and used in
     // place.
     const std::size_t with_comment = header.size() + 3;

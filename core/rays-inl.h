@@ -123,7 +123,7 @@ HWY_INLINE RealVector<D> unit_vector(const RealVector<D>& v) {
 
 template <class D>
 struct RayOf {
-    RealVector<D> origin, direction;  // world; unit length
+    RealVector<D> origin, direction;  // unit length
 };
 
 /// Camera::ray for columns and rows that are integers.
@@ -163,6 +163,17 @@ HWY_INLINE IntervalOf<D> intersect_box(const RayOf<D>& ray, const Vec3& low, con
     }
     const auto none = outside | !(inside.first < inside.last);
     return {choose(none, D(0), inside.first), choose(none, D(0), inside.last)};
+}
+/// The same for a box along axes of its own.
+template <class D>
+HWY_INLINE IntervalOf<D> intersect_turned_box(const RayOf<D>& ray, const TurnedBox& box) {
+    RayOf<D> along;
+    for (std::size_t a = 0; a < 3; ++a) {
+        const D x(box.axes[a].x), y(box.axes[a].y), z(box.axes[a].z);
+        along.origin[a] = x * ray.origin[0] + y * ray.origin[1] + z * ray.origin[2];
+        along.direction[a] = x * ray.direction[0] + y * ray.direction[1] + z * ray.direction[2];
+    }
+    return intersect_box(along, box.low, box.high);
 }
 
 }  // namespace squint::HWY_NAMESPACE

@@ -29,9 +29,9 @@ inline const std::array<Vec3, 3> kNoTurn{Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0
 struct Volume {
     Index3 dims{0, 0, 0};   // voxels along x, y, z; x runs fastest
     Vec3 spacing{1, 1, 1};  // world units between voxel centres
-    Vec3 origin{0, 0, 0};   // position of the first voxel's centre
-    /// The grid's x, y and z as unit vectors in world space; kNoTurn where they lie along the world's axes.
-    /// The inverse turns positions and directions of the world into the grid's own space.
+    Vec3 origin{0, 0, 0};   // the first voxel's centre, in grid space
+    /// The grid's x, y and z as unit vectors in world space; kNoTurn where they lie along the world's axes.  Grid
+    /// space has these axes and the world's unit and origin.
     std::array<Vec3, 3> turn = kNoTurn;
     ScalarType type = ScalarType::u8;
     /// dims.x * dims.y * dims.z scalars of `type`, little-endian; 64 bytes after them can be read.
@@ -64,24 +64,29 @@ struct Volume {
                              [](std::int64_t voxel, const VoxelRun& run) { return voxel < run.first; });
         return after != zeros.begin() && end <= (after - 1)->end;
     }
-    /// The box that is rendered: from the first to the last voxel centre.  An axis of one voxel is one
-    /// spacing thick, half to each side of its centre, and the field is constant along it.
-    Vec3 box_low() const { return world_from_voxel(Vec3(0) - half_of_thin_axes()); }
-    Vec3 box_high() const { return world_from_voxel(Vec3(dims - Index3(1)) + half_of_thin_axes()); }
+    /// The box that is rendered, in grid space: from the first to the last voxel centre.  An axis of one voxel is
+    /// one spacing thick, half to each side of its centre, and the field is constant along it.
+    Vec3 box_low() const { return grid_from_voxel(Vec3(0) - half_of_thin_axes()); }
+    Vec3 box_high() const { return grid_from_voxel(Vec3(dims - Index3(1)) + half_of_thin_axes()); }
     bool is_thin(int axis) const { return dims[axis] == 1; }
 
     double smallest_spacing() const { return std::min(spacing.x, std::min(spacing.y, spacing.z)); }
 
     double value_at(double scalar) const { return value_scale * scalar + value_offset; }  // file's units
 
-    bool turned() const { return turn != kNoTurn; }
-    /// A vector from the grid's own space to world space, and back.
-    Vec3 world_from_grid(const Vec3& v) const { return turn[0] * v.x + turn[1] * v.y + turn[2] * v.z; }
-    Vec3 grid_from_world(const Vec3& v) const { return Vec3(turn[0].dot(v), turn[1].dot(v), turn[2].dot(v)); }
+    Vec3 voxel_from_grid(const Vec3& p) const { return (p - origin) / spacing; }
+    Vec3 grid_from_voxel(const Vec3& p) const { return origin + p * spacing; }
+    Vec3 voxel_from_world(const Vec3& p) const { return voxel_from_grid(grid_from_world(p)); }
+    Vec3 world_from_voxel(const Vec3& p) const { return world_from_grid(grid_from_voxel(p)); }
 
-    // In these two, "world" is the grid's own space; the two differ only for a turned volume.
-    Vec3 voxel_from_world(const Vec3& p) const { return (p - origin) / spacing; }
-    Vec3 world_from_voxel(const Vec3& p) const { return origin + p * spacing; }
+    bool turned() const { return turn != kNoTurn; }
+    /// A position or a direction; unchanged bits for a volume that is not turned.
+    Vec3 world_from_grid(const Vec3& v) const {
+        return turned() ? turn[0] * v.x + turn[1] * v.y + turn[2] * v.z : v;
+    }
+    Vec3 grid_from_world(const Vec3& v) const {
+        return turned() ? Vec3(turn[0].dot(v), turn[1].dot(v), turn[2].dot(v)) : v;
+    }
 
   private:
     Vec3 half_of_thin_axes() const {

@@ -135,11 +135,6 @@ Volume load_file(const VolumeSource& source, const LoadLimits& limits, std::vect
             "are left-posterior-superior, show it turned by half a turn about z: volume.space = "
             "\"lps\" turns it",
             source.file));
-    if (stored.turn != kNoTurn)
-        throw InputError(
-            fmt::format("{}: its axes are not along x, y and z but turned against them, which is not "
-                        "rendered yet",
-                        source.file));
     stored.spacing = spacing_of(source, source.file, stored.spacing);
     return levels_from_stored(stored, source, limits, notes);
 }

@@ -517,6 +517,12 @@ Volume levels_from_stored(const StoredVolume& stored, const VolumeSource& source
     if (stored.reordered())
         notes.push_back(
             fmt::format("{}: axes are permuted or flipped; voxels were put in x, y, z order", stored.where));
+    if (volume.turned()) {
+        const double cosine = (volume.turn[0].x + volume.turn[1].y + volume.turn[2].z - 1) / 2;
+        notes.push_back(fmt::format(
+            "{}: axes are turned by {:.3g} degrees against x, y, z; voxels are rendered where they lie",
+            stored.where, std::acos(std::clamp(cosine, -1.0, 1.0)) * 57.29577951308232));
+    }
 
     const bool floats = is_float(stored.type);
     const auto range = floats ? std::pair<std::int64_t, std::int64_t>{} : stored_range(stored, values);

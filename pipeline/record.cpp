@@ -217,16 +217,20 @@ Json json_of(const Memory& m) {
 }
 
 Json json_of(const Volume& v) {
-    return {{"name", v.name},
-            {"dims", {v.dims.x, v.dims.y, v.dims.z}},
-            {"type", v.type == ScalarType::u8 ? "u8" : "u16"},
-            {"scalar_bits", v.scalar_bits},
-            {"spacing", {v.spacing.x, v.spacing.y, v.spacing.z}},
-            {"origin", {v.origin.x, v.origin.y, v.origin.z}},
-            {"scalar_range", {v.smallest, v.largest}},
-            {"value_range",
-             {v.value_scale * v.smallest + v.value_offset, v.value_scale * v.largest + v.value_offset}},
-            {"hash", v.content_hash}};
+    const Vec3 origin = v.world_from_voxel(Vec3(0));
+    Json json{{"name", v.name},
+              {"dims", {v.dims.x, v.dims.y, v.dims.z}},
+              {"type", v.type == ScalarType::u8 ? "u8" : "u16"},
+              {"scalar_bits", v.scalar_bits},
+              {"spacing", {v.spacing.x, v.spacing.y, v.spacing.z}},
+              {"origin", {origin.x, origin.y, origin.z}},
+              {"scalar_range", {v.smallest, v.largest}},
+              {"value_range",
+               {v.value_scale * v.smallest + v.value_offset, v.value_scale * v.largest + v.value_offset}},
+              {"hash", v.content_hash}};
+    for (std::size_t a = 0; v.turned() && a < 3; ++a)
+        json["axes"].push_back({v.turn[a].x, v.turn[a].y, v.turn[a].z});
+    return json;
 }
 
 Json json_of_scene(const Scene& scene) {

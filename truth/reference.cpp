@@ -296,9 +296,10 @@ class Reference {
     std::unique_ptr<Blocks> blocks_;
 };
 
-/// The intersection of the volume's box and the scene's clip box.
+/// The intersection of the volume's box and the scene's clip box, where both lie along the same axes.
 Vec3 Reference::corner(bool high) const {
     const Volume& v = *plan_.volume;
+    if (v.turned()) return high ? v.box_high() : v.box_low();
     const auto& clip = high ? plan_.scene.clip.high : plan_.scene.clip.low;
     Vec3 corner = high ? v.box_high() : v.box_low();
     for (int a = 0; clip && a < 3; ++a)
@@ -325,7 +326,8 @@ Reference::Reference(const Plan& plan, double tolerance, bool many_rays)
 
 std::array<double, 4> Reference::pixel(int column, int row) const {
     const Ray ray = plan_.camera.ray(column, row);
-    const Interval inside = intersect(ray, low_, high_);
+    Interval inside = intersect(ray, low_, high_);
+    if (plan_.clip) inside = common(inside, intersect(ray, *plan_.clip));
     if (inside.empty()) return {};
     const double chord = inside.last - inside.first;
     CellWalk walk(*plan_.volume, ray, inside, blocks_.get());

@@ -159,7 +159,7 @@ Blocks::Blocks(const Volume& volume, const std::function<bool(double, double)>& 
 
 CellWalk::CellWalk(const Volume& volume, const Ray& ray, const Interval& inside, const Blocks* blocks)
     : blocks_(blocks),
-      origin_(volume.voxel_from_world(ray.origin)),
+      origin_(volume.voxel_from_grid(ray.origin)),
       rate_(ray.direction / volume.spacing),
       here_(inside.first),
       end_(inside.last) {

@@ -57,7 +57,7 @@ NearestParts nearest_along(const Corners& corners, const Passage& passage);
 /// The scalars at the corners of a cell; an axis of one voxel repeats it.
 Corners corners_of(const Volume& volume, const Index3& cell);
 
-/// The gradient along a passage, in levels per smallest voxel spacing, in world space.  The rules of
+/// The gradient along a passage, in levels per smallest voxel spacing, in grid space.  The rules of
 /// docs/conventions.md are all trilinear in the cell: differences of samples one voxel apart, clamped to the
 /// box, are interpolated differences of voxels.
 std::array<Cubic, 3> gradient_along(const Volume& volume, GradientRule rule, const Passage& passage);

@@ -29,7 +29,8 @@ RayLight::RayLight(const Scene& scene, const Volume& volume, const Camera& camer
       shortest_(0x1p-40 * static_cast<double>(volume.largest - volume.smallest)),
       eye_(-ray_direction) {
     for (const Light& light : scene.lights) {
-        const Vec3 towards = light.headlight ? -camera.view : light.direction.normalized();
+        const Vec3 towards =
+            light.headlight ? -camera.view : volume.grid_from_world(light.direction.normalized());
         white_ = white_ && light.color == Vec3(1);
         lamp_[lamps_++] = {towards, (towards + eye_).normalized(), light.color};
     }

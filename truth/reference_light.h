@@ -43,8 +43,9 @@ class Power {
 /// The lights as one ray meets them.
 class RayLight {
   public:
+    /// Camera and ray in grid space.
     RayLight(const Scene& scene, const Volume& volume, const Camera& camera, const Vec3& ray_direction);
-    /// `gradient` is in world space, in levels per smallest voxel spacing.  A zero gradient gets only ambient
+    /// `gradient` is in grid space, in levels per smallest voxel spacing.  A zero gradient gets only ambient
     /// light, and one below 2^-40 of the data's range counts as zero: a rounding error has a direction, too.
     Reflection operator()(const Vec3& gradient) const;
 

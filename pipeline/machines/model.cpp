@@ -50,9 +50,10 @@ void store(const Plan& plan, const Pixel<W>& pixel, int column, int row, Image& 
     }
     if (output.normals) {
         const double one = std::ldexp(1.0, plan.gradient.normal_fraction);
-        put(image, "N.x", at, to_double(pixel.first_normal[0]) / one);
-        put(image, "N.y", at, to_double(pixel.first_normal[1]) / one);
-        put(image, "N.z", at, to_double(pixel.first_normal[2]) / one);
+        const auto& n = pixel.first_normal;
+        const Vec3 normal = plan.volume->world_from_grid(
+            Vec3(to_double(n[0]) / one, to_double(n[1]) / one, to_double(n[2]) / one));
+        put(image, "N.x", at, normal.x), put(image, "N.y", at, normal.y), put(image, "N.z", at, normal.z);
     }
     if (output.samples) put(image, "samples", at, static_cast<double>(pixel.samples));
     if (output.transparency) put(image, "T", at, 1 - color[3]);

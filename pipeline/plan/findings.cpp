@@ -16,8 +16,9 @@ std::optional<std::string> clip_beside(const Plan& plan) {
     for (int axis = 0; axis < 3; ++axis)
         if (!(plan.box_low[axis] < plan.box_high[axis]))
             return fmt::format(
-                "clip: the box kept lies beside the volume, which spans {:g} to {:g} along {}: {}",
-                plan.volume->box_low()[axis], plan.volume->box_high()[axis], "xyz"[axis], kEmpty);
+                "clip: the box kept lies beside the volume, which spans {:g} to {:g} along {}{}: {}",
+                plan.volume->box_low()[axis], plan.volume->box_high()[axis], plan.clip ? "its own " : "",
+                "xyz"[axis], kEmpty);
     return std::nullopt;
 }
 

@@ -20,17 +20,48 @@ using namespace HWY_NAMESPACE;
 
 // -------------------------------------------------------------------------------------------- rays
 
-Vec3 clipped_low(const Plan& plan) {
-    Vec3 low = plan.volume->box_low();
-    if (const auto& clip = plan.scene.clip.low)
-        for (int a = 0; a < 3; ++a) low[a] = std::max(low[a], (*clip)[a]);
-    return low;
+struct Box {
+    Vec3 low, high;
+};
+Box common(const Box& a, const Box& b) {
+    Box box;
+    for (int i = 0; i < 3; ++i)
+        box.low[i] = std::max(a.low[i], b.low[i]), box.high[i] = std::min(a.high[i], b.high[i]);
+    return box;
 }
-Vec3 clipped_high(const Plan& plan) {
-    Vec3 high = plan.volume->box_high();
-    if (const auto& clip = plan.scene.clip.high)
-        for (int a = 0; a < 3; ++a) high[a] = std::min(high[a], (*clip)[a]);
-    return high;
+bool empty(const Box& box) {
+    return !(box.low.x < box.high.x && box.low.y < box.high.y && box.low.z < box.high.z);
+}
+/// The least box along other axes that holds a box.
+Box bounds_along(const std::array<Vec3, 3>& axes, const Box& box) {
+    const Vec3 middle = (box.low + box.high) * 0.5, half = (box.high - box.low) * 0.5;
+    Box bounds;
+    for (int i = 0; i < 3; ++i) {
+        const Vec3& axis = axes[static_cast<std::size_t>(i)];
+        const double at = middle.dot(axis),
+                     reach = half.dot(Vec3(std::abs(axis.x), std::abs(axis.y), std::abs(axis.z)));
+        bounds.low[i] = at - reach, bounds.high[i] = at + reach;
+    }
+    return bounds;
+}
+
+/// The volume's box, and what the scene's clip box leaves of it: of a turned volume by a box of its own, too.
+void set_boxes(Plan& plan) {
+    constexpr double kFar = std::numeric_limits<double>::infinity();
+    const Volume& v = *plan.volume;
+    const ClipSettings& clip = plan.scene.clip;
+    const Box kept{clip.low.value_or(Vec3(-kFar)), clip.high.value_or(Vec3(kFar))};
+    Box box{v.box_low(), v.box_high()};
+    if (!v.turned()) {
+        box = common(box, kept);
+    } else if (clip.low || clip.high) {
+        const std::array<Vec3, 3> world{v.grid_from_world(Vec3(1, 0, 0)), v.grid_from_world(Vec3(0, 1, 0)),
+                                        v.grid_from_world(Vec3(0, 0, 1))};
+        plan.clip = TurnedBox{world, kept.low, kept.high};
+        const Box seen = common(bounds_along(world, box), kept);
+        box = empty(seen) ? Box{box.low, box.low} : common(box, bounds_along(v.turn, seen));
+    }
+    plan.box_low = box.low, plan.box_high = box.high;
 }
 
 // ----------------------------------------------------------------------------------------- formats
@@ -212,10 +243,11 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
     plan.scene = scene;
     plan.volume = std::move(volume);
     const Volume& v = *plan.volume;
-    plan.camera = make_camera(scene.camera, v, scene.image.width, scene.image.height, frame);
+    plan.camera =
+        in_grid_space(make_camera(scene.camera, v, scene.image.width, scene.image.height, frame), v);
     plan.entries = sample_entries(resolve_transfer_function(scene, v), v);
     plan.step_world = scene.sampling.step * v.smallest_spacing();
-    plan.box_low = clipped_low(plan), plan.box_high = clipped_high(plan);
+    set_boxes(plan);
     if (most_steps(plan) > 16e6)
         throw InputError(
             fmt::format("sampling.step: {} makes rays of {:.0f} samples, and 16000000 are allowed",

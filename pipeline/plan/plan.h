@@ -17,6 +17,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -37,13 +38,14 @@ struct StageReport {
 struct Plan {
     Scene scene;
     std::shared_ptr<const Volume> volume;
-    Camera camera;
+    Camera camera;  // in the volume's grid space, as all else here
     Entries entries;
     WireSpecs specs;
     bool real = false;      // presets `real` and `float32`: nothing is quantised, words are doubles
     bool float32 = false;   // or floats
     double step_world = 1;  // world units of a full slab
-    Vec3 box_low{0, 0, 0}, box_high{0, 0, 0};  // the rendered part of the volume, in world space
+    Vec3 box_low{0, 0, 0}, box_high{0, 0, 0};  // the rendered part of the volume, in grid space
+    std::optional<TurnedBox> clip;  // of a turned volume: the scene's clip box, which cuts that part
 
     LocationStage location;
     InterpolationStage interpolation;

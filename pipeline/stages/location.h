@@ -23,7 +23,7 @@ struct RaySetup {
     // Sample `last_index`, in voxels: the exit, which is less than a step from the sample before.
     Vec3 last{0, 0, 0};
     Vec3 step{0, 0, 0};         // V, in voxels
-    Vec3 direction{0, 0, 1};    // unit, world
+    Vec3 direction{0, 0, 1};    // unit, in grid space
     int slabs = 0;              // n = ceil(chord / step); 0: the ray misses the volume
     int last_index = 0;         // n, or n - 1 where samples lie in the middle of slabs
     double last_length = 1;     // of the last slab, in steps: in (0, 1]

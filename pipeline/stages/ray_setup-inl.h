@@ -16,6 +16,15 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
+/// The part of a ray that is rendered.
+template <class D>
+HWY_INLINE IntervalOf<D> rendered_part(const Plan& plan, const RayOf<D>& ray) {
+    const IntervalOf<D> inside = intersect_box(ray, plan.box_low, plan.box_high);
+    if (!plan.clip) return inside;
+    const IntervalOf<D> kept = intersect_turned_box(ray, *plan.clip);
+    return {greater(inside.first, kept.first), lesser(inside.last, kept.last)};
+}
+
 /// RaySetup (pipeline/stages/location.h) over D; a ray that misses the volume has no slabs.
 template <class D>
 struct RaySetupOf {
@@ -27,7 +36,7 @@ template <class D>
 HWY_INLINE RaySetupOf<D> set_up_ray(const Plan& plan, D column, D row) {
     const Volume& volume = *plan.volume;
     const RayOf<D> ray = ray_through(plan.camera, column, row);
-    const IntervalOf<D> inside = intersect_box(ray, plan.box_low, plan.box_high);
+    const IntervalOf<D> inside = rendered_part(plan, ray);
     const D step_world(plan.step_world);
     const D steps = (inside.last - inside.first) / Divisor(plan.step_world);
     // A chord of n steps is n slabs: 2^-30 of a step forgives the rounding of the chord itself.

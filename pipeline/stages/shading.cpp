@@ -70,7 +70,8 @@ ShadingStage build_shading(const StageInputs& in) {
     const Spec material = in.specs[Wire::material];
     for (std::size_t l = 0; l < in.scene.lights.size(); ++l) {
         const Light& light = in.scene.lights[l];
-        const Vec3 towards = light.headlight ? -in.camera.view : light.direction.normalized();
+        const Vec3 towards =
+            light.headlight ? -in.camera.view : in.volume.grid_from_world(light.direction.normalized());
         const Vec3 half = (towards - in.camera.view).normalized();
         for (int axis = 0; axis < 3; ++axis) {
             const auto a = static_cast<std::size_t>(axis);

@@ -41,6 +41,8 @@ void add_settings(Hasher& hasher, const Scene& scene, const Volume& volume,
     const auto number = [&](double x) { hasher.bytes(&x, sizeof x); };
     hasher.text(volume.content_hash);
     for (int a = 0; a < 3; ++a) number(volume.spacing[a]), number(volume.origin[a]);
+    if (volume.turned())
+        for (const Vec3& axis : volume.turn) number(axis.x), number(axis.y), number(axis.z);
     number(volume.value_scale), number(volume.value_offset), number(volume.scalar_bits);
     const TransferFunction tf = resolve_transfer_function(scene, volume);
     hasher.number(tf.color.size());

@@ -111,7 +111,7 @@ struct VtkPeer::Parts {
     void aim(const Camera& c) {
         camera = c;
         const Vec3 low = plan.volume->origin,
-                   high = plan.volume->world_from_voxel(Vec3(plan.volume->dims - Index3(1)));
+                   high = plan.volume->grid_from_voxel(Vec3(plan.volume->dims - Index3(1)));
         const double diagonal = (high - low).length();
         // Parallel views stand off, so that the box lies well between the clipping planes.
         const bool parallel = c.projection == Projection::orthographic;
@@ -129,7 +129,8 @@ struct VtkPeer::Parts {
         to->SetClippingRange(std::max(distance - diagonal, diagonal / 1000), distance + diagonal);
         for (std::size_t i = 0; i < lights.size(); ++i) {
             const Light& light = plan.scene.lights[i];
-            const Vec3 towards = light.headlight ? c.view * -1.0 : light.direction.normalized();
+            const Vec3 towards =
+                light.headlight ? c.view * -1.0 : plan.volume->grid_from_world(light.direction.normalized());
             const Vec3 at = c.center + towards * distance;
             lights[i]->SetLightTypeToSceneLight();
             lights[i]->PositionalOff();
@@ -228,7 +229,7 @@ std::array<double, 4> VtkPeer::Parts::pixel_in_double(int x, int y) const {
     const Volume& v = *plan.volume;
     const Ray ray = camera.ray(x + origin[0], camera.height - 1 - (y + origin[1]));
     const Vec3 first(start[0] / VTKKW_FP_SCALE, start[1] / VTKKW_FP_SCALE, start[2] / VTKKW_FP_SCALE);
-    const double entry = (v.world_from_voxel(first) - ray.origin).dot(ray.direction);
+    const double entry = (v.grid_from_voxel(first) - ray.origin).dot(ray.direction);
     const Entries& e = plan.entries;
     const unsigned short *diffuse = mapper->GetDiffuseShadingTable(0),
                          *specular = mapper->GetSpecularShadingTable(0);
@@ -236,7 +237,7 @@ std::array<double, 4> VtkPeer::Parts::pixel_in_double(int x, int y) const {
 
     double T = 1;
     for (unsigned int k = 0; k < steps && T >= 255 / VTKKW_FP_SCALE; ++k) {
-        const Vec3 at = v.voxel_from_world(ray.origin + ray.direction * (entry + k * plan.step_world));
+        const Vec3 at = v.voxel_from_grid(ray.origin + ray.direction * (entry + k * plan.step_world));
         std::int64_t cell[3];
         double weight[3];
         for (int a = 0; a < 3; ++a) {

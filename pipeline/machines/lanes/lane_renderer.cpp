@@ -65,7 +65,7 @@ int slab_reach(const Plan& plan) {
 BlockBox blocks_met(const Plan& plan) {
     const Volume& volume = *plan.volume;
     const BlockBox all = all_blocks_of(volume);
-    const Vec3 low = volume.voxel_from_world(plan.box_low), high = volume.voxel_from_world(plan.box_high);
+    const Vec3 low = volume.voxel_from_grid(plan.box_low), high = volume.voxel_from_grid(plan.box_high);
     const double beyond = kBlock * (slab_reach(plan) + 1) + drift_of(plan) + 1;
     BlockBox box;
     for (int a = 0; a < 3; ++a) {

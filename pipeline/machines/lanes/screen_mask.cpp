@@ -9,8 +9,8 @@
 namespace squint::lanes {
 namespace {
 
-// A box in the world, by its middle and half its sides.
-struct WorldBox {
+// A box in grid space, by its middle and half its sides.
+struct GridBox {
     Vec3 middle, half;
 };
 
@@ -19,7 +19,7 @@ struct Bounds {
 };
 
 // What x . axis can be, for x in the box less `from`.
-Bounds along(const WorldBox& box, const Vec3& from, const Vec3& axis) {
+Bounds along(const GridBox& box, const Vec3& from, const Vec3& axis) {
     const double middle = (box.middle - from).dot(axis);
     const double reach =
         std::abs(axis.x) * box.half.x + std::abs(axis.y) * box.half.y + std::abs(axis.z) * box.half.z;
@@ -31,7 +31,7 @@ Bounds over(const Bounds& x, const Bounds& depth) {
 }
 
 // Marks a box's rectangle on the screen; false where it has none, for it reaches behind the eye.
-bool mark_box(const Camera& camera, const WorldBox& box, ScreenMask& mask) {
+bool mark_box(const Camera& camera, const GridBox& box, ScreenMask& mask) {
     Bounds across = along(box, camera.eye, camera.right), above = along(box, camera.eye, camera.up);
     if (camera.projection == Projection::perspective) {
         const Bounds depth = along(box, camera.eye, camera.view);
@@ -95,7 +95,7 @@ ScreenMask visible_packets(const Plan& plan, const EmptySpace& empty) {
             for (std::int64_t i = 0; i < n.x; ++i) {
                 const Index3 at(low.x + i, low.y + j, low.z + k);
                 if (empty.at(at.x, at.y, at.z) != 0 || is_inside(empty, at.x, at.y, at.z)) continue;
-                const Vec3 middle = volume.world_from_voxel(
+                const Vec3 middle = volume.grid_from_voxel(
                     (Vec3(static_cast<double>(at.x), static_cast<double>(at.y), static_cast<double>(at.z)) +
                      Vec3(0.5)) *
                     static_cast<double>(kBlock));

@@ -1,6 +1,7 @@
 #!/usr/bin/python3
-"""write_volumes.py FOLDER: the same 20x16x12 voxels in every format, by other people's libraries where there are
-such (nibabel, pydicom), otherwise to the letter of the format; and series that no volume can be made of."""
+"""write_volumes.py FOLDER [origin]: the same 20x16x12 voxels in every format, by other people's programs where there are
+such (nibabel, pydicom, teem, ImageMagick, OpenImageIO), otherwise to the letter of the format; and series that no
+volume can be made of.  With `origin` the first voxel lies at the world's origin, as in pictures, which state no place."""
 import base64
 import os
 import struct
@@ -22,6 +23,14 @@ def voxels():
     z, y, x = numpy.mgrid[0:NZ, 0:NY, 0:NX]
     ball = numpy.sqrt((x - 9.5) ** 2 + ((y - 7.5) * 1.2) ** 2 + ((z - 5.5) * 1.6) ** 2) < 8
     return (ball * 1400 - 1000 + x * 7 + y * 3 + z * 5).astype(numpy.int16)
+
+
+def turn():
+    """25 degrees about (1, 2, 3): columns are the directions of x, y and z (Rodrigues)."""
+    x, y, z = numpy.array([1, 2, 3]) / numpy.sqrt(14)
+    across = numpy.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    angle = numpy.radians(25)
+    return numpy.eye(3) + numpy.sin(angle) * across + (1 - numpy.cos(angle)) * across @ across
 
 
 def ras_from_lps(values):
@@ -57,9 +66,9 @@ def write_nifti(folder, v):
     holed = xyz.astype(numpy.float32)
     holed[5, 4, 3] = numpy.nan
     save("nan.nii", holed, lps)
-    c, s = numpy.cos(0.3), numpy.sin(0.3)
-    turned = numpy.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]) @ lps
-    save("turned.nii", xyz, turned)
+    turned = numpy.eye(4)
+    turned[:3, :3] = numpy.diag([-1, -1, 1]) @ turn() @ numpy.diag([-1, -1, 1])
+    save("turned.nii", xyz, turned @ lps)
     sheared = nibabel.Nifti1Image(xyz, None)
     affine = lps.copy()
     affine[0, 2] = SPACING[2] * numpy.tan(numpy.radians(15))
@@ -67,7 +76,7 @@ def write_nifti(folder, v):
     sheared.to_filename(f"{folder}/sheared.nii")
 
 
-def write_dicom(folder, slices, order=None, offset=1000, uid=None, number=3, shear=0.0, change=lambda ds, k: None):
+def write_dicom(folder, slices, order=None, offset=1000, uid=None, number=3, shear=0.0, turned=numpy.eye(3), change=lambda ds, k: None):
     """Slices [z, y, x] in a shuffled order, by pydicom; `change` may spoil the k-th."""
     os.makedirs(folder, exist_ok=True)
     uid = uid or generate_uid()
@@ -88,8 +97,9 @@ def write_dicom(folder, slices, order=None, offset=1000, uid=None, number=3, she
         ds.SamplesPerPixel, ds.PhotometricInterpretation = 1, "MONOCHROME2"
         ds.BitsAllocated, ds.BitsStored, ds.HighBit, ds.PixelRepresentation = 16, 12, 11, 0
         ds.RescaleSlope, ds.RescaleIntercept = "1", str(-offset)
-        ds.ImageOrientationPatient = [1, 0, 0, 0, 1, 0]
-        ds.ImagePositionPatient = [ORIGIN[0] + shear * k, ORIGIN[1], ORIGIN[2] + SPACING[2] * k]
+        place = turned @ (ORIGIN[0] + shear * k, ORIGIN[1], ORIGIN[2] + SPACING[2] * k)
+        ds.ImageOrientationPatient = [f"{x:.10f}" for x in (*turned[:, 0], *turned[:, 1])]
+        ds.ImagePositionPatient = [f"{x:.10f}" for x in place]
         ds.PixelSpacing, ds.SliceThickness = [SPACING[1], SPACING[0]], "2"
         ds.PixelData = (slices[k] + offset).astype("<u2").tobytes()
         change(ds, k)
@@ -103,6 +113,7 @@ def write_all_dicom(folder, v):
     write_dicom(f"{folder}/rle", v, order, change=lambda ds, k: ds.compress(RLELossless))
     write_dicom(f"{folder}/gap", v, [k for k in order if k != 5])
     write_dicom(f"{folder}/tilted", v, order, shear=SPACING[2] * numpy.tan(numpy.radians(15)))
+    write_dicom(f"{folder}/turned", v, order, turned=turn())
     write_dicom(f"{folder}/two_series", v, order)
     write_dicom(f"{folder}/two_series", v[:4] + 100, number=7)
     same = generate_uid()
@@ -130,11 +141,12 @@ def write_meta_image(folder, v):
     raw = v.astype("<i2").tobytes()
     packed = zlib.compress(raw)
 
-    def save(name, more, data, where="LOCAL"):
+    def save(name, more, data, where="LOCAL", turned=numpy.eye(3)):
+        first = turned @ ORIGIN
         header = (
             f"ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n{more}"
-            "TransformMatrix = 1 0 0 0 1 0 0 0 1\n"
-            f"Offset = {ORIGIN[0]} {ORIGIN[1]} {ORIGIN[2]}\nCenterOfRotation = 0 0 0\nAnatomicalOrientation = RAI\n"
+            f"TransformMatrix = {' '.join(map(repr, map(float, turned.T.ravel())))}\n"
+            f"Offset = {first[0]} {first[1]} {first[2]}\nCenterOfRotation = 0 0 0\nAnatomicalOrientation = RAI\n"
             f"ElementSpacing = {SPACING[0]} {SPACING[1]} {SPACING[2]}\nDimSize = {NX} {NY} {NZ}\n"
             f"ElementType = MET_SHORT\nElementDataFile = {where}\n"
         )
@@ -143,21 +155,32 @@ def write_meta_image(folder, v):
 
     save("a.mha", "CompressedData = False\n", raw)
     save("packed.mha", f"CompressedData = True\nCompressedDataSize = {len(packed)}\n", packed)
+    save("turned.mha", "", raw, turned=turn())
     save("a.mhd", "", b"", "a.raw")
     with open(f"{folder}/a.raw", "wb") as file:
         file.write(raw)
 
 
-def write_nrrd(folder, name, v, space, origin):
+def write_nrrd(folder, name, v, space, origin, turned=numpy.eye(3)):
+    steps = " ".join("(%r,%r,%r)" % tuple(map(float, turned[:, axis] * SPACING[axis])) for axis in range(3))
+    origin = [float(x) for x in origin]
     with open(f"{folder}/{name}", "wb") as file:
         file.write(
             (
                 f"NRRD0004\ntype: short\ndimension: 3\nspace: {space}\nsizes: {NX} {NY} {NZ}\n"
-                f"space directions: ({SPACING[0]},0,0) (0,{SPACING[1]},0) (0,0,{SPACING[2]})\n"
+                f"space directions: {steps}\n"
                 f"endian: little\nencoding: raw\nspace origin: ({origin[0]},{origin[1]},{origin[2]})\n\n"
             ).encode()
             + v.astype("<i2").tobytes()
         )
+
+
+def write_by_teem(folder):
+    """The voxels of a.raw in gzip."""
+    steps = "(%g,0,0) (0,%g,0) (0,0,%g)" % SPACING
+    subprocess.run(
+        ["teem-unu", "make", "-i", f"{folder}/a.raw", "-t", "short", "-s", str(NX), str(NY), str(NZ), "-en", "little", "-spc", "LPS",
+         "-orig", "(%g,%g,%g)" % ORIGIN, "-dirs", steps, "-e", "gzip", "-o", f"{folder}/teem.nrrd"], check=True)
 
 
 def write_vti(folder, v):
@@ -167,13 +190,16 @@ def write_vti(folder, v):
     packed = [zlib.compress(block) for block in blocks]
     table = struct.pack(f"<{3 + len(blocks)}I", len(blocks), 1000, len(raw) % 1000, *map(len, packed))
 
-    def save(name, kind, inside, compressor="", after=b""):
+    def save(name, kind, inside, compressor="", after=b"", turned=numpy.eye(3)):
+        first = turned @ ORIGIN
+        direction = " ".join(map(repr, map(float, turned.ravel())))
         extent = f"0 {NX - 1} 0 {NY - 1} 0 {NZ - 1}"
         place = 'offset="0" ' if kind == "appended" else ""
         head = (
             f'<?xml version="1.0"?>\n<VTKFile type="ImageData" version="1.0" byte_order="LittleEndian" '
             f'header_type="UInt32"{compressor}>\n<ImageData WholeExtent="{extent}" '
-            f'Origin="{ORIGIN[0]} {ORIGIN[1]} {ORIGIN[2]}" Spacing="{SPACING[0]} {SPACING[1]} {SPACING[2]}">\n'
+            f'Origin="{first[0]} {first[1]} {first[2]}" Spacing="{SPACING[0]} {SPACING[1]} {SPACING[2]}" '
+            f'Direction="{direction}">\n'
             f'<Piece Extent="{extent}"><PointData Scalars="s"><DataArray type="Int16" Name="s" {place}format="{kind}">'
         )
         with open(f"{folder}/{name}", "wb") as file:
@@ -181,6 +207,7 @@ def write_vti(folder, v):
             file.write(b"</DataArray></PointData></Piece></ImageData>" + after + b"</VTKFile>")
 
     save("text.vti", "ascii", " ".join(map(str, v.ravel())).encode())
+    save("turned.vti", "ascii", " ".join(map(str, v.ravel())).encode(), turned=turn())
     save("base64.vti", "binary", base64.b64encode(count + raw))
     save("packed.vti", "binary", base64.b64encode(table) + base64.b64encode(b"".join(packed)),
          ' compressor="vtkZLibDataCompressor"')
@@ -216,9 +243,17 @@ def main(folder):
     write_nrrd(folder, "a.nrrd", v, "left-posterior-superior", ORIGIN)
     last = (-(ORIGIN[0] + SPACING[0] * (NX - 1)), -(ORIGIN[1] + SPACING[1] * (NY - 1)), ORIGIN[2])
     write_nrrd(folder, "ras.nrrd", ras_from_lps(v), "right-anterior-superior", last)
+    write_nrrd(folder, "turned.nrrd", v, "left-posterior-superior", turn() @ ORIGIN, turn())
+    quarter = numpy.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    write_nrrd(folder, "quarter.nrrd", v, "left-posterior-superior", quarter @ ORIGIN, quarter)
+    rounding = 6.123e-17 * numpy.array([[1, 0, 0], [0, 1, 0], [0, 0, 0]])  # cos(90 degrees) in doubles
+    write_nrrd(folder, "rounded.nrrd", v, "left-posterior-superior", quarter @ ORIGIN, quarter + rounding)
+    write_by_teem(folder)
     write_vti(folder, v)
     write_stacks(folder, v)
 
 
 if __name__ == "__main__":
+    if "origin" in sys.argv[2:]:
+        ORIGIN = (0.0, 0.0, 0.0)
     main(sys.argv[1])

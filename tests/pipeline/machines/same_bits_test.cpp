@@ -74,6 +74,21 @@ std::shared_ptr<const Volume> draw_volume(Draw& draw, Scene& scene) {
     return std::make_shared<Volume>(make_procedural(field, dims, bits, spacing));
 }
 
+/// Every sixth volume is turned, by a quaternion: from a draw of its own, so that all else of a scene stays.
+std::shared_ptr<const Volume> turned_by_chance(Draw draw, const std::shared_ptr<const Volume>& volume) {
+    if (!draw.once_in(6)) return volume;
+    double w = draw.real(-1, 1);
+    Vec3 v = draw.vector(-1, 1);
+    const double length = std::sqrt(w * w + v.dot(v));
+    w /= length, v /= length;
+    Volume turned = *volume;
+    for (int a = 0; a < 3; ++a) {
+        const Vec3 axis(a == 0, a == 1, a == 2);
+        turned.turn[static_cast<std::size_t>(a)] = axis + v.cross(v.cross(axis) + axis * w) * 2.0;
+    }
+    return std::make_shared<const Volume>(turned);
+}
+
 void draw_transfer_function(Draw& draw, const Volume& volume, Scene& scene) {
     TransferFunctionSettings& function = scene.transfer_function;
     function = {};
@@ -193,7 +208,8 @@ Case draw_case(unsigned seed, const std::string& preset) {
     scene.image.width = scene.image.height = 24;
     scene.output.fixed = scene.output.samples = scene.output.transparency = true;
     scene.output.depth = draw.once_in(3), scene.output.normals = draw.once_in(3);
-    const std::shared_ptr<const Volume> volume = draw_volume(draw, scene);
+    const std::shared_ptr<const Volume> volume =
+        turned_by_chance(Draw(seed + 0x70726e), draw_volume(draw, scene));
     draw_transfer_function(draw, *volume, scene);
     draw_camera(draw, *volume, scene);
     draw_light(draw, scene);
@@ -248,6 +264,8 @@ std::vector<Share> shares() {
         {"light that fades in", [](const Plan& p) { return p.gradient.fades; }},
         {"gooch", [](const Plan& p) { return p.lit && p.shading.model == ShadingModel::gooch; }},
         {"one voxel thick along x", [](const Plan& p) { return p.volume->dims.x == 1; }},
+        {"turned", [](const Plan& p) { return p.volume->turned(); }},
+        {"turned and clipped", [](const Plan& p) { return p.clip.has_value(); }},
     };
 }
 
