@@ -2,6 +2,7 @@
 
 #include "core/portable_math.h"
 #include "pipeline/plan/ranges.h"
+#include "pipeline/plan/short_slabs.h"
 #include "pipeline/stages/inputs.h"
 
 #include <fmt/format.h>
@@ -121,6 +122,34 @@ void warn_of_highlights(Plan& plan) {
                     "{} more fraction bits on each keep it below four",
                     plan.scene.shading.exponent, lsb8, bits_above(lsb8 / 4)));
 }
+void warn_of_shorter_slabs(Plan& plan) {
+    for (const Approximation& a : plan.approximations)
+        if (a.of == kShorterSlabs && a.lsb8 > 4)
+            plan.warnings.push_back(
+                fmt::format("short slabs: {} has tables for one length of slab, and the colour of a ray's "
+                            "last one may be off "
+                            "by {:.2g} of 255; a smaller step, or pips or leg, which ask for no length",
+                            name_of(plan.scene.classification.method), a.lsb8));
+}
+void warn_of_weak_gradients(Plan& plan) {
+    if (!plan.lit) return;
+    // Two levels of lerps and the gradient round, on three axes.  The least gradient of neighbours that differ is half a
+    // level long: its normal turns by the error over that, kd's cosine by as much, and u^n, whose steepest slope over the
+    // angle is sqrt(n / e), by that many times more.
+    const double component =
+        2 * rounding_of(plan.specs[Wire::gradient_lerp]) + rounding_of(plan.specs[Wire::gradient]);
+    const ShadingSettings& s = plan.scene.shading;
+    const double turn = std::sqrt(3.0) * component / 0.5,
+                 slope = s.kd + s.ks * std::sqrt(s.exponent * 0.36788);
+    const double lsb8 = kLsb8 * std::min(s.kd + s.ks, slope * turn);
+    if (lsb8 <= 4) return;
+    plan.warnings.push_back(
+        fmt::format("weak gradients: precision.gradient is {}, which may cost light {:.2g} of 255 where "
+                    "neighbouring voxels differ by one "
+                    "level; {} fraction bits on gradient and gradient_lerp keep it below four",
+                    to_string(plan.specs[Wire::gradient]), lsb8,
+                    format_of(plan, Wire::gradient).fraction_bits + bits_above(lsb8 / 4)));
+}
 void warn_of_bright_light(Plan& plan) {
     const ShadingSettings& s = plan.scene.shading;
     const double sum = s.ka + s.kd + s.ks;
@@ -162,9 +191,10 @@ PresetInputs preset_inputs(const Plan& plan) {
 }
 
 void warn_of_formats(Plan& plan) {
-    warn_of_bright_light(plan);
+    warn_of_bright_light(plan), warn_of_shorter_slabs(plan);
     if (plan.real) return;
-    warn_of_faint_matter(plan), warn_of_short_slabs(plan), warn_of_highlights(plan);
+    warn_of_faint_matter(plan), warn_of_short_slabs(plan), warn_of_highlights(plan),
+        warn_of_weak_gradients(plan);
 }
 
 }  // namespace squint

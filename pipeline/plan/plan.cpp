@@ -3,6 +3,7 @@
 #include "pipeline/plan/demands.h"
 #include "pipeline/plan/findings.h"
 #include "pipeline/plan/ranges.h"
+#include "pipeline/plan/short_slabs.h"
 #include "pipeline/stages/inputs.h"
 #include "pipeline/stages/ray_setup-inl.h"
 
@@ -136,6 +137,7 @@ void plan_classification(Plan& plan) {
     plan.tables = std::move(report.tables);
     plan.notes.insert(plan.notes.end(), report.notes.begin(), report.notes.end());
     plan.approximations = std::move(report.approximations);
+    if (const Approximation a = shorter_slabs(plan); a.lsb8 > 0) plan.approximations.push_back(a);
     report_approximations(plan);
 }
 
