@@ -33,7 +33,12 @@ RayLight::RayLight(const Scene& scene, const Volume& volume, const Camera& camer
             light.headlight ? -camera.view : volume.grid_from_world(light.direction.normalized());
         white_ = white_ && light.color == Vec3(1);
         lamp_[lamps_++] = {towards, (towards + eye_).normalized(), light.color};
+        limits_.push_back(towards);
+        if (settings_->ks > 0) limits_.push_back(lamp_[lamps_ - 1].half);
     }
+    const ShadingSettings& s = *settings_;
+    has_corners_at_its_limits_ = s.model == ShadingModel::blinn_phong && s.power != PowerRule::parabola &&
+                                 lamps_ == 1 && white_ && !(s.gradient_floor > 0) && s.ka + s.kd <= 1;
 }
 
 // C = (a kd c + cool) (1 - N.L) / 2 + (b kd c + warm) (1 + N.L) / 2, or with the sides exchanged (Guetat et
@@ -47,7 +52,7 @@ Reflection RayLight::tone(double facing) const {
 
 Reflection RayLight::operator()(const Vec3& gradient) const {
     const ShadingSettings& s = *settings_;
-    Vec3 diffuse{0, 0, 0}, specular{0, 0, 0};
+    Vec3 diffuse{0, 0, 0}, specular{0, 0, 0};  // of white lamps: in x alone
     const double length = std::sqrt(gradient.dot(gradient));
     const double certain = s.gradient_floor > 0 ? std::min(1.0, length / s.gradient_floor) : 1;
     double facings = 0;
@@ -65,8 +70,11 @@ Reflection RayLight::operator()(const Vec3& gradient) const {
             }
             if (s.two_sided) facing = std::abs(facing);
             facings += facing;
-            diffuse += lamp.color * unit_clamped(facing);
-            specular += lamp.color * power_(unit_clamped(highlight));
+            const double shade = unit_clamped(facing), shine = power_(unit_clamped(highlight));
+            if (white_)
+                diffuse.x += shade, specular.x += shine;
+            else
+                diffuse += lamp.color * shade, specular += lamp.color * shine;
         }
     }
     if (s.model == ShadingModel::gooch) return tone(std::clamp(facings, -1.0, 1.0) * certain);

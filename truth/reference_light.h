@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <vector>
 
 namespace squint::reference {
 
@@ -48,6 +49,10 @@ class RayLight {
     /// `gradient` is in grid space, in levels per smallest voxel spacing.  A zero gradient gets only ambient
     /// light, and one below 2^-40 of the data's range counts as zero: a rounding error has a direction, too.
     Reflection operator()(const Vec3& gradient) const;
+    /// Directions at a right angle to which a normal is at the limit of a lamp's light, or of its highlight.
+    const std::vector<Vec3>& limits() const { return limits_; }
+    /// Whether the light's value has corners there and nowhere else: one white lamp, no limit of a sum.
+    bool has_corners_at_its_limits() const { return has_corners_at_its_limits_; }
 
   private:
     struct Lamp {
@@ -63,6 +68,8 @@ class RayLight {
     std::array<Lamp, kMostLights> lamp_;
     std::size_t lamps_ = 0;
     bool white_ = true;  // whether every lamp is
+    std::vector<Vec3> limits_;
+    bool has_corners_at_its_limits_ = false;
 };
 
 }  // namespace squint::reference
