@@ -127,6 +127,11 @@ void add_render(CLI::App& app, RenderArguments& a) {
     verb.add_flag("--error", a.error,
                   "Measure the error against the same scene in double, and each stage's share: up to eight "
                   "more pictures");
+    verb.add_flag(
+        "--bound", a.bound,
+        "Prove how far any pixel can be from the same scene without rounding, who pays for it, and which "
+        "rays "
+        "are undecided; the EXR gets the channels bound.R, bound.G, bound.B, bound.A (docs/guarantees.md)");
     verb.add_flag("--reference", a.reference, "Measure the error against the exact integral along each ray");
     verb.add_option("--reference-output", a.reference_output, "Write that integral's picture as EXR")
         ->type_name("OUT.exr");

@@ -25,7 +25,8 @@ struct RenderArguments {
     std::string reference_output;       // the reference picture, as EXR
     RenderOptions options;
     std::int64_t max_memory = 0;  // bytes; 0: no limit
-    bool reference = false, error = false, quiet = false, scene_reference = false, print_scene = false;
+    bool reference = false, error = false, bound = false, quiet = false, scene_reference = false,
+         print_scene = false;
 };
 struct PlanArguments {
     SceneArguments scene;

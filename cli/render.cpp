@@ -4,6 +4,7 @@
 #include "core/error.h"
 #include "core/preview.h"
 #include "core/text.h"
+#include "pipeline/machines/certificate.h"
 #include "pipeline/record.h"
 #include "scene/presets.h"
 #include "truth/reference.h"
@@ -155,6 +156,29 @@ std::string price_of_errors(const Plan& plan, const RenderStatistics& statistics
                        text_of_time(static_cast<double>(stages + 1) * statistics.seconds));
 }
 
+std::string bound_text(const Certificate& c) {
+    std::string text = fmt::format(
+        "  bound, proven: no pixel is more than {:.4g} LSB8 from the picture without rounding (median "
+        "{:.4g}); worst {} at "
+        "({}, {})\n",
+        c.most, c.median, "RGBA"[c.channel], c.column, c.row);
+    std::string why;
+    for (std::size_t d = 0; d < kDoubtNames.size(); ++d)
+        if (c.undecided[d] > 0)
+            why += fmt::format("{}{} {}", why.empty() ? "" : ", ", kDoubtNames[d], c.undecided[d]);
+    text += fmt::format("    undecided: {} of {} rays{}; all others {:.4g} LSB8 at most\n", c.undecided_rays,
+                        c.rays, why.empty() ? "" : " (" + why + ")", c.most_decided);
+    for (const auto& [stage, share] : shares_by_stage(c)) {
+        if (share <= 0) continue;
+        std::string wires;
+        for (int p = 0; p < kWires; ++p)
+            if (kWireInfo[static_cast<std::size_t>(p)].stage == stage && c.shares[p] > 0)
+                wires += fmt::format("{}{} {:.2g}", wires.empty() ? "  " : ", ", payer_name(p), c.shares[p]);
+        text += fmt::format("    {:<16} {:>8.3g}{}\n", stage, share, wires);
+    }
+    return text;
+}
+
 struct Job {
     const RenderArguments& arguments;
     Scene scene;
@@ -175,6 +199,8 @@ void write_reference(const Job& job, const Plan& plan, const Image& reference, i
 Json render_frame(const Job& job, int frame) {
     const RenderArguments& a = job.arguments;
     const Plan plan = plan_asked_for(job.scene, job.volume, frame);
+    if (a.bound)
+        if (const auto obstacle = what_is_not_bounded(plan)) throw InputError("--bound: " + *obstacle);
     const RenderStatistics nothing;
     const std::int64_t needed = memory_of(plan, nothing).total();
     refuse_beyond(a.max_memory, needed, "the scene");
@@ -186,6 +212,7 @@ Json render_frame(const Job& job, int frame) {
     options.progress = [&](double part) { (*bar)(part); };
     Rendering rendering;
     Errors errors;
+    Certificate certificate;
     {
         const Interruptible here;
         rendering = render(plan, options);
@@ -195,6 +222,10 @@ Json render_frame(const Job& job, int frame) {
             if (!a.quiet) std::fputs(price_of_errors(plan, rendering.statistics).c_str(), stderr);
             errors = rounding_errors(plan, rendering.image, options, frame);
         }
+        if (a.bound)
+            certificate = certify(
+                plan,
+                {.threads = options.threads, .channels = !job.output.empty(), .cancelled = &interrupted});
         if (a.reference || !a.reference_output.empty()) {
             ProgressBar second(!a.quiet);
             ReferenceOptions exact{.threads = options.threads, .cancelled = &interrupted};
@@ -207,7 +238,11 @@ Json render_frame(const Job& job, int frame) {
     const int frames = job.scene.camera.turntable;
     const std::string exr = frame_path(job.output, frame, frames),
                       png = frame_path(job.preview, frame, frames);
-    if (!exr.empty()) write_exr(rendering.image, exr, exr_attributes(plan, frame));
+    if (!exr.empty()) {
+        Image whole = rendering.image;
+        for (const Channel& channel : certificate.image.channels) whole.channels.push_back(channel);
+        write_exr(whole, exr, exr_attributes(plan, frame));
+    }
     if (!png.empty()) {
         const Vec3& b = job.scene.image.background;
         const double background[3] = {b.x, b.y, b.z};
@@ -230,9 +265,11 @@ Json render_frame(const Job& job, int frame) {
         for (const std::string& warning : warnings)
             std::fputs(fmt::format("  warning: {}\n", message_text(warning)).c_str(), stderr);
         if (measured) std::fputs(error_text(errors).c_str(), stderr);
+        if (a.bound) std::fputs(bound_text(certificate).c_str(), stderr);
     }
     if (a.options.audit && a.json != "-") print(audit_text(plan, rendering.statistics));
     Json record = json_of(plan, rendering, measured ? &errors : nullptr, a.options.audit);
+    if (a.bound) record["bound"] = json_of(certificate);
     record["frame"] = frame;
     if (frame == 0) record["wires"] = json_of_wires(plan), record["warnings"] = warnings;
     return record;

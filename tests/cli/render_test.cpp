@@ -116,6 +116,32 @@ TEST_F(Render, ATurntableNumbersItsPictures) {
     EXPECT_NE(pictures[0]["hash"], pictures[1]["hash"]);
 }
 
+TEST_F(Render, ProvesABoundAndKeepsItBesideThePicture) {
+    const std::string unlit = kSmall + "--set lights=[] --set precision.preset=eight_bit ";
+    const Outcome r = squint("render" + unlit + "--error --bound -o b.exr --json -");
+    ASSERT_EQ(r.code, 0) << r.err;
+    const auto picture = r.json()["pictures"][0];
+    const double most = picture["bound"]["most_lsb8"];
+    EXPECT_GE(most, picture["error"]["against_real"]["all"]["RGB"]["max_error_lsb8"]);
+    EXPECT_LT(most, 255);
+    double by_stage = 0;
+    for (const auto& stage : picture["bound"]["stages_lsb8"]) by_stage += stage.get<double>();
+    EXPECT_NEAR(by_stage, most, 1e-9 * most);
+    const Image exr = read_image((folder / "b.exr").string());
+    double greatest = 0;
+    for (const char* name : {"bound.R", "bound.G", "bound.B", "bound.A"}) {
+        ASSERT_NE(exr.find(name), nullptr) << name;
+        for (const float x : exr.find(name)->values)
+            greatest = std::max(greatest, 255 * static_cast<double>(x));
+    }
+    EXPECT_NEAR(greatest, most, 1e-5 * most);
+    const Outcome same = squint("render" + unlit + "-q --json -");
+    EXPECT_EQ(same.json()["pictures"][0]["hash"], picture["hash"]) << "bounds are no part of the picture";
+    const Outcome text = squint("render" + unlit + "--bound -o b.exr");
+    EXPECT_NE(text.err.find("bound, proven: no pixel is more than"), std::string::npos) << text.err;
+    expect_refusal(squint("render" + kSmall + "--set classification.method=leg --bound -o b.exr"), "--bound");
+}
+
 TEST_F(Render, ErrorIsReportedAndAttributedToStages) {
     const Outcome r = squint("render" + kSmall + "--set precision.preset=eight_bit --error --json -");
     ASSERT_EQ(r.code, 0) << r.err;
