@@ -500,9 +500,10 @@ void add_search(CLI::App& app, SearchArguments& a) {
         ->capture_default_str();
     verb.add_option(
             "--guarantee", a.guarantee,
-            "What the formats are held to: views, formats that a held-out view breaks are never written; "
+            "What the formats are held to: views, formats that a held-out view breaks are never written; or "
+            "pictures, no pixel of the --views pictures can err by more, proven (docs/guarantees.md); "
             "default: views")
-        ->check(CLI::IsMember({"views"}))
+        ->check(CLI::IsMember({"views", "pictures"}))
         ->type_name("NAME");
     verb.add_option("--restarts", s.descent.restarts,
                     "Times that the search starts again from a random place below")

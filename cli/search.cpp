@@ -2,6 +2,8 @@
 #include "studies/search/search.h"
 #include "cli/common.h"
 #include "cli/shelf.h"
+#include "core/error.h"
+#include "studies/search/by_certificate.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -63,6 +65,46 @@ std::string summary(const search::Settings& s, const search::Result& r) {
 
 }  // namespace
 
+namespace {
+
+std::string summary(const search::Settings& s, const search::CertifiedResult& r) {
+    std::string text = fmt::format("bound of at most {:g} LSB8, proven for {} pictures; {} certificates\n",
+                                   s.most_error, r.pictures, r.certificates);
+    std::vector<std::vector<std::string>> rows{{"", "bits", "bound", "measured", "undecided rays"}};
+    const auto row = [&](const char* name, const search::Proven& p) {
+        rows.push_back({name, fmt::format("{:.0f}", p.bits), text_of_error(p.bound), text_of_error(p.error),
+                        fmt::format("{} of {}", p.undecided, p.rays)});
+    };
+    row("found", r.found), row("as the scene says", r.scene);
+    text += table_text(rows) + "\n";
+    rows = {{"wire", "found", "as the scene says"}};
+    for (const Wire wire : r.wires)
+        rows.push_back({std::string(info(wire).name), to_string(r.found.specs[wire].format),
+                        to_string(r.scene.specs[wire].format)});
+    text += table_text(rows) + "\n";
+    text += fmt::format(
+        "guarantee: pictures; no pixel of these {} errs by more than {:.4g} LSB8 by rounding; nothing is "
+        "proven of other views, sizes or data\n",
+        r.pictures, r.found.bound);
+    return text + fmt::format("{}: squint render {}--set precision.preset={}\n", r.formats_file,
+                              s.scenes.empty() ? "" : s.scenes[0] + " ",
+                              std::filesystem::absolute(r.formats_file).string());
+}
+
+/// What a search ends with: its summary or record, or why there is none.
+template <class Result>
+int told(const SearchArguments& a, const search::Settings& settings, const Result& result) {
+    if (!result.failure.empty())
+        return std::fputs(fmt::format("squint: {}\n", result.failure).c_str(), stderr), kComparisonFailed;
+    if (a.json)
+        print_json(result.json);
+    else if (!a.quiet)
+        print(summary(settings, result));
+    return kDone;
+}
+
+}  // namespace
+
 int run(const SearchArguments& a) {
     search::Settings settings = a.settings;
     for (std::string& scene : settings.scenes) scene = file_of(scene);
@@ -73,15 +115,19 @@ int run(const SearchArguments& a) {
         if (!a.quiet) line.clear(), std::fputs(fmt::format("note: {}\n", note).c_str(), stderr);
     };
     const Interruptible here;
+    if (a.guarantee == "pictures") {
+        if (settings.cost != search::CostKind::bits || settings.figure != search::Figure::largest ||
+            settings.srgb)
+            throw InputError(
+                "--guarantee pictures: bounds are of the greatest error in linear light, and bits are what "
+                "is made few; allowed: without --cost, --figure and --transfer");
+        const search::CertifiedResult result = run_by_certificate(settings);
+        line.clear();
+        return told(a, settings, result);
+    }
     const search::Result result = run_search(settings);
     line.clear();
-    if (!result.failure.empty())
-        return std::fputs(fmt::format("squint: {}\n", result.failure).c_str(), stderr), kComparisonFailed;
-    if (a.json)
-        print_json(result.json);
-    else if (!a.quiet)
-        print(summary(settings, result));
-    return kDone;
+    return told(a, settings, result);
 }
 
 }  // namespace squint::cli

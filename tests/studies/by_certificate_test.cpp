@@ -1,0 +1,91 @@
+// squint search --guarantee pictures: what it writes is proven, and what it proves is written.
+#include "studies/search/by_certificate.h"
+#include "core/error.h"
+#include "core/volume_source.h"
+#include "pipeline/machines/certificate.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+namespace squint::search {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+class ByCertificate : public ::testing::Test {
+  protected:
+    void SetUp() override {
+        std::string name = (fs::temp_directory_path() / "squint-certified-XXXXXX").string();
+        ASSERT_NE(mkdtemp(name.data()), nullptr);
+        folder = name;
+    }
+    void TearDown() override { fs::remove_all(folder); }
+
+    Settings small(double most_error) const {
+        Settings s;
+        s.overrides = {"volume.dims=16", "image.width=12", "image.height=10", "camera.height=16",
+                       "lights=[]"};
+        s.most_error = most_error, s.views = 2, s.threads = 1;
+        s.folder = (folder / "run").string();
+        return s;
+    }
+    fs::path folder;
+};
+
+TEST_F(ByCertificate, WritesFormatsWhoseCertificatesHoldForEveryPicture) {
+    for (const double most : {0.5, 2.0, 8.0}) {
+        const Settings s = small(most);
+        const CertifiedResult r = run_by_certificate(s);
+        ASSERT_EQ(r.failure, "");
+        EXPECT_LE(r.found.bound, most);
+        EXPECT_GT(r.found.bound, most / 3) << "no more bits than asked for";
+        EXPECT_LE(r.found.error, r.found.bound);
+        EXPECT_EQ(r.pictures, 2u);
+        // As a user reads them.
+        std::vector<std::string> overrides = s.overrides;
+        overrides.push_back("precision.preset=\"" + r.formats_file + "\"");
+        overrides.push_back("camera.turntable=2");
+        const Scene scene = scene_with(built_in_scene(), overrides);
+        const auto volume = std::make_shared<const Volume>(load_volume(volume_source(scene)));
+        double worst = 0;
+        for (int view = 0; view < 2; ++view)
+            worst = std::max(worst, certify(make_plan(scene, volume, view)).most);
+        EXPECT_DOUBLE_EQ(worst, r.found.bound);
+    }
+}
+
+TEST_F(ByCertificate, TakesFewerBitsForALooserBound) {
+    double bits = INFINITY;
+    for (const double most : {0.4, 1.0, 4.0, 16.0}) {
+        const CertifiedResult r = run_by_certificate(small(most));
+        EXPECT_LT(r.found.bits, bits) << most;
+        bits = r.found.bits;
+    }
+}
+
+TEST_F(ByCertificate, SaysWhoBindsWhereABoundCannotBeMet) {
+    const CertifiedResult none = run_by_certificate(small(1e-9));
+    EXPECT_THAT(none.failure, HasSubstr("--max-error: found 1e-09, but the nearest formats have a bound of"));
+    EXPECT_THAT(none.failure, HasSubstr(" makes "));
+    EXPECT_EQ(none.formats_file, "");
+    EXPECT_FALSE(fs::exists(folder / "run" / "formats.toml"));
+}
+
+TEST_F(ByCertificate, RefusesWhatIsNotBoundedInOneLine) {
+    Settings s = small(1);
+    s.overrides.pop_back();
+    try {
+        run_by_certificate(s);
+        FAIL() << "light was not refused";
+    } catch (const InputError& error) {
+        EXPECT_THAT(error.what(),
+                    HasSubstr("--guarantee pictures: the built-in scene: light is not bounded yet"));
+    }
+}
+
+}  // namespace
+}  // namespace squint::search
