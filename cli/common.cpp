@@ -57,17 +57,18 @@ std::shared_ptr<const Volume> load(const Scene& scene, std::vector<std::string>&
     return std::make_shared<const Volume>(load_volume(volume_source(scene), limits, &notes));
 }
 
-std::shared_ptr<const Volume> load_and_complete(Scene& scene, std::vector<std::string>& notes,
-                                                std::int64_t max_bytes) {
+std::shared_ptr<const Volume> load_and_complete(const SceneArguments& arguments, Scene& scene,
+                                                std::vector<std::string>& notes, std::int64_t max_bytes) {
     auto volume = load(scene, notes, max_bytes);
     complete_from_data(scene, *volume, notes);
+    if (is_of_data(file_of(arguments.file), arguments.overrides)) frame_data(scene, *volume);
     return volume;
 }
 
 Plan plan_of(const SceneArguments& arguments) {
     Scene scene = read(arguments);
     std::vector<std::string> notes;
-    const auto volume = load_and_complete(scene, notes);
+    const auto volume = load_and_complete(arguments, scene, notes);
     Plan plan = plan_asked_for(scene, volume);
     plan.notes.insert(plan.notes.begin(), notes.begin(), notes.end());
     return plan;

@@ -32,9 +32,10 @@ Scene read(const SceneArguments& arguments);
 Scene scene_of_volume(const std::string& name_or_file, const std::vector<std::string>& overrides);
 
 /// Loads the scene's volume, and refuses one beyond `max_bytes` (0: no limit).  A scene without a transfer
-/// function gets the data's own.
-std::shared_ptr<const Volume> load_and_complete(Scene& scene, std::vector<std::string>& notes,
-                                                std::int64_t max_bytes = 0);
+/// function gets the data's own; where the arguments name a volume in place of a scene, the camera frames what it
+/// shows.
+std::shared_ptr<const Volume> load_and_complete(const SceneArguments& arguments, Scene& scene,
+                                                std::vector<std::string>& notes, std::int64_t max_bytes = 0);
 
 /// Loads the scene's volume, at most `max_bytes` (0: no limit).  `notes` receives what a user should know.
 std::shared_ptr<const Volume> load(const Scene& scene, std::vector<std::string>& notes,

@@ -310,7 +310,7 @@ int run(const RenderArguments& a) {
     Scene scene = read(a.scene);
     if (a.print_scene) {
         std::vector<std::string> unread;
-        load_and_complete(scene, unread, a.max_memory);
+        load_and_complete(a.scene, scene, unread, a.max_memory);
         return print(to_toml(scene)), kDone;
     }
     if (a.options.audit && rounds_nothing(scene.precision.preset))
@@ -320,7 +320,7 @@ int run(const RenderArguments& a) {
     refuse_beyond(a.max_memory, image_bytes(scene),
                   fmt::format("a picture of {}x{} pixels", scene.image.width, scene.image.height));
     std::vector<std::string> notes;
-    const auto volume = load_and_complete(scene, notes, a.max_memory);
+    const auto volume = load_and_complete(a.scene, scene, notes, a.max_memory);
     const Job job{a, scene, volume, output, preview};
     if (!a.quiet)
         for (const std::string& note : notes)
