@@ -7,7 +7,8 @@ bool rounds_nothing(std::string_view preset) {
 }
 
 CompositingForm preset_form(std::string_view name) {
-    if (name == "squeeze") return CompositingForm::equation_9;
+    for (const std::string_view by_equation_9 : {"squeeze", "volumepro", "vizard2", "ultravis"})
+        if (name == by_equation_9) return CompositingForm::equation_9;
     if (name == "eight_bit") return CompositingForm::unit255_shift;
     return CompositingForm::w;
 }

@@ -20,10 +20,11 @@ namespace squint {
 
 enum class PositionRule { p0_kv, accumulate };
 enum class InterpolationRule { trilinear, nearest };
+enum class LerpRule { one_product, two_products };  // Squeeze, equations 14 and 15, or 13
 enum class GradientRule { central, central_samples, analytic, sobel };
 enum class Method { pc, pc_mid, pi2d, pi2d_no_attenuation, pi1d, pi1d_engel, pips, leg };
 enum class TableLookup { bilinear, nearest };
-enum class AlphaEncoding { alpha, sqrt_alpha };  // how tables store opacity, in the format of table_alpha
+enum class AlphaEncoding { alpha, sqrt_alpha, transparency };  // what of an opacity table_alpha stores
 enum class ShadingModel { none, phong, blinn_phong, cone, gooch };
 enum class ConeSlope { energy, paper };
 enum class CoolSide { shadow, light };
@@ -37,7 +38,8 @@ enum class CompositingForm {
     alpha,
     back_to_front,
     unit255_shift,
-    unit255_blinn
+    unit255_blinn,
+    straight
 };
 enum class CompositingMode { over, mip, minip, average };
 enum class LayoutRule { automatic, linear, cells };
@@ -53,17 +55,18 @@ struct EnumNames;
 SQUINT_NAMES(Projection, "orthographic", "perspective");
 SQUINT_NAMES(PositionRule, "p0_kv", "accumulate");
 SQUINT_NAMES(InterpolationRule, "trilinear", "nearest");
+SQUINT_NAMES(LerpRule, "one_product", "two_products");
 SQUINT_NAMES(GradientRule, "central", "central_samples", "analytic", "sobel");
 SQUINT_NAMES(Method, "pc", "pc_mid", "pi2d", "pi2d_no_attenuation", "pi1d", "pi1d_engel", "pips", "leg");
 SQUINT_NAMES(TableLookup, "bilinear", "nearest");
-SQUINT_NAMES(AlphaEncoding, "alpha", "sqrt_alpha");
+SQUINT_NAMES(AlphaEncoding, "alpha", "sqrt_alpha", "transparency");
 SQUINT_NAMES(ShadingModel, "none", "phong", "blinn_phong", "cone", "gooch");
 SQUINT_NAMES(ConeSlope, "energy", "paper");
 SQUINT_NAMES(CoolSide, "shadow", "light");
 SQUINT_NAMES(InsideRule, "mean", "front", "middle", "adaptive");
 SQUINT_NAMES(PowerRule, "squaring", "parabola", "table");
 SQUINT_NAMES(CompositingForm, "auto", "w", "w_carry", "equation_9", "alpha", "back_to_front", "unit255_shift",
-             "unit255_blinn");
+             "unit255_blinn", "straight");
 SQUINT_NAMES(CompositingMode, "over", "mip", "minip", "average");
 SQUINT_NAMES(LayoutRule, "auto", "linear", "cells");
 #undef SQUINT_NAMES
@@ -102,6 +105,7 @@ struct SamplingSettings {
     double termination = 1.0 / 1024;  // a ray ends when T falls below this; 0: never early
     PositionRule position = PositionRule::p0_kv;
     InterpolationRule interpolation = InterpolationRule::trilinear;
+    LerpRule lerp = LerpRule::one_product;
 };
 
 struct ClipSettings {
@@ -137,6 +141,7 @@ struct ClassificationSettings {
     TableLookup lookup = TableLookup::bilinear;
     AlphaEncoding encoding = AlphaEncoding::alpha;
     bool opaque_prediction = true;  // experiments only: without it thin opaque surfaces are lost
+    bool as_printed = false;        // for experiments only: pips with the errors of the paper
 
     /// The order; where none is given, the least that the method has.
     int order_or_least() const { return order.value_or(method == Method::leg ? 2 : 1); }
@@ -156,7 +161,7 @@ struct OutputSettings {
 };
 
 struct PrecisionSettings {
-    std::string preset = "default";  // default, squeeze, eight_bit, wide, real, float32, or a file
+    std::string preset = "default";  // one of kPrecisionPresets, or a file
     std::array<std::optional<std::string>, kWires>
         override_;  // by wire: "u1.15 trn sat"; parts may be left out
 };
@@ -247,6 +252,8 @@ void visit_scene(S& scene, V&& visit) {
     visit("sampling.termination", scene.sampling.termination, "a ray ends when T falls below this; 0: never");
     visit("sampling.position", scene.sampling.position, "p0_kv (exact, quantised once) or accumulate");
     visit("sampling.interpolation", scene.sampling.interpolation, "trilinear or nearest");
+    visit("sampling.lerp", scene.sampling.lerp,
+          "one_product, v0 + w (v1 - v0), or two_products, v0 (1 - w) + v1 w, each rounded");
     visit("clip.low", scene.clip.low, "corner of the box kept, world units");
     visit("clip.high", scene.clip.high, "opposite corner");
     auto& shading = scene.shading;
@@ -281,21 +288,24 @@ void visit_scene(S& scene, V&& visit) {
           "n of pips (1 to 5; default 1) and leg (2 to 4; default 2)");
     visit("classification.table_size", classification.table_size, "entries a side of pi2d, 64 to 4096");
     visit("classification.lookup", classification.lookup, "pi2d: bilinear or nearest");
-    visit("classification.encoding", classification.encoding,
-          "alpha or sqrt_alpha, stored in table_alpha's format");
+    visit(
+        "classification.encoding", classification.encoding,
+        "what of an opacity is stored in table_alpha's format: alpha, sqrt_alpha or transparency, 1 - alpha");
     visit("classification.opaque_prediction", classification.opaque_prediction,
           "find opaque values inside a slab");
     visit("compositing.mode", scene.compositing.mode, "over, mip, minip or average");
     visit("compositing.form", scene.compositing.form,
-          "w, w_carry (remainders carried on), equation_9, alpha, back_to_front, unit255_shift or "
-          "unit255_blinn; auto: w, but equation_9 for the preset squeeze and unit255_shift for eight_bit");
+          "w, w_carry (remainders carried on), equation_9, alpha, back_to_front, unit255_shift, "
+          "unit255_blinn or "
+          "straight (C is divided by its opacity); auto: w, but unit255_shift for the preset eight_bit and "
+          "equation_9 for squeeze, volumepro, vizard2 and ultravis");
     visit("output.depth", scene.output.depth, "channels Z and Z.mean");
     visit("output.normals", scene.output.normals, "channels N.x N.y N.z");
     visit("output.samples", scene.output.samples, "channel samples");
     visit("output.transparency", scene.output.transparency, "channel T");
     visit("output.fixed", scene.output.fixed, "channels fixed.R fixed.G fixed.B fixed.T: the raw words");
     visit("precision.preset", scene.precision.preset,
-          "default, squeeze, eight_bit, wide, real, float32 or a preset file");
+          "default, squeeze, eight_bit, volumepro, vizard2, ultravis, wide, real, float32 or a preset file");
     for (int i = 0; i < kWires; ++i) {
         const auto& wire = kWireInfo[static_cast<std::size_t>(i)];
         visit("precision." + std::string(wire.name), scene.precision.override_[static_cast<std::size_t>(i)],
@@ -334,8 +344,8 @@ std::string expand_path(const std::string& text, const std::string& folder, cons
 VolumeSource volume_source(const Scene& scene);
 
 /// The built-in precision presets.
-inline constexpr std::string_view kPrecisionPresets[] = {"default", "squeeze", "eight_bit",
-                                                         "wide",    "real",    "float32"};
+inline constexpr std::string_view kPrecisionPresets[] = {
+    "default", "squeeze", "eight_bit", "volumepro", "vizard2", "ultravis", "wide", "real", "float32"};
 /// The precision settings with a preset file, where one is named, merged under the scene's own wires:
 /// `preset` is then a built-in one.  A preset file is TOML with one table, [precision]: a built-in `preset`,
 /// and wires. Throws InputError.

@@ -17,10 +17,13 @@ namespace squint {
 namespace {
 
 // An alpha as it comes back from the table's word.  sqrt(alpha) is stored in F bits and expanded to c + (c >>
-// (F - 1)), so that 0 and 1 are exact; the square has 2 F fraction bits (Squeeze 4.4.2, as corrected).
+// (F - 1)), so that 0 and 1 are exact; the square has 2 F fraction bits (Squeeze 4.4.2, as corrected).  Its
+// R G B T of 8, 8, 8 and 15 bits stores 1 - alpha.
 double decoded_alpha(double alpha, const Spec& spec, AlphaEncoding encoding) {
     if (encoding == AlphaEncoding::alpha) return alpha;
     const int f = spec.format.fraction_bits;
+    if (encoding == AlphaEncoding::transparency)
+        return 1 - std::ldexp(static_cast<double>(quantise_real(1 - alpha, spec)), -f);
     const std::int64_t code = std::min(quantise_real(std::sqrt(alpha), spec), (std::int64_t{1} << f) - 1);
     const double root =
         static_cast<double>(code + (code >> (f - 1))) / static_cast<double>(std::int64_t{1} << f);
@@ -225,6 +228,11 @@ EntryLookup build_entry_lookup(const ClassificationInputs& in) {
             fmt::format("precision.table_alpha: {} has no fraction bits, but the root of an "
                         "opacity needs 1 or more",
                         to_string(alpha.format)));
+    const bool encoded = in.settings.encoding != AlphaEncoding::alpha;
+    if (encoded && !rooted && alpha.format.integer_bits == 0)
+        throw InputError(
+            fmt::format("precision.table_alpha: {} has no integer bits, but a transparency of 1.0 needs 1",
+                        to_string(alpha.format)));
     Spec stored = alpha;
     if (rooted) stored.format = {1, std::min(2 * alpha.format.fraction_bits, kMostChosenFractionBits), false};
     const auto size = static_cast<std::size_t>(n), row_count = static_cast<std::size_t>(rows);
@@ -242,10 +250,10 @@ EntryLookup build_entry_lookup(const ClassificationInputs& in) {
         lookup.has_opaque = lookup.has_opaque || opaque;
     }
     write_rows(in, bits, opacity, seen);
-    for (std::size_t i = 0; rooted && i < row_count; ++i)
+    for (std::size_t i = 0; encoded && i < row_count; ++i)
         seen[4 * i + EntryLookup::alpha] = decoded_alpha(opacity[i], alpha, in.settings.encoding);
     lookup.table.fill(seen, std::array{color, color, color, stored});
-    for (int i = 0; rooted && i < rows; ++i)
+    for (int i = 0; encoded && i < rows; ++i)
         lookup.table.set_exact(i, EntryLookup::alpha, opacity[static_cast<std::size_t>(i)], stored.format);
     lookup.matter.fill(matter,
                        std::array{extinction, Spec{{2, 0, false}, Rounding::rnd_conv, Overflow::sat}});

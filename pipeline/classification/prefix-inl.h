@@ -8,6 +8,7 @@
 
 #include "pipeline/classification/prefix.h"
 
+#include "fixedpoint/quotients-inl.h"
 #include "fixedpoint/unrolled-inl.h"
 #include "pipeline/classification/entries-inl.h"
 
@@ -18,32 +19,11 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
-/// A quotient for any wire: where the wire has fewer fraction bits than the exact quotient, the denominator
-/// is shifted.
-template <class N>
-HWY_INLINE auto divide(const N& numerator, const N& denominator, const Rescale& to) {
-    Rescale whole = to;
-    whole.shift = std::min(to.shift, 0);
-    return quotient(numerator, to.shift > 0 ? N(shift_left(denominator, to.shift)) : denominator, whole);
-}
-
 /// A prefix sum at a position, linear between rows, exact: it has `bits` more fraction bits than its words.
 template <class W>
 HWY_INLINE W prefix_at(const Table& table, const EntryPosition<W>& at, int column, int bits) {
     return blend(gather(table, at.entry, column), gather(table, at.entry + constant<W>(1), column),
                  at.fraction, bits);
-}
-
-/// A divisor: x >= 0, or its last bit where it is zero.  Without rounding every x above zero stays as it is.
-/// N: the word or its Wide.
-template <class W, class N>
-HWY_INLINE N divisor(const N& x) {
-    if constexpr (RealWord<W>)
-        return select(constant<W>(0) < x, x, constant<W>(1));
-    else if constexpr (std::is_same_v<N, W>)
-        return max(x, constant<W>(1));
-    else
-        return max(x, widen(constant<W>(1)));
 }
 
 /// T, exact, with gained_bits() more fraction bits than its words.  For tau linear over a row,

@@ -171,7 +171,8 @@ bool transparent_is_identity(const Plan& plan) {
     const CompositingMode mode = plan.scene.compositing.mode;
     return plan.compositing.form != CompositingForm::unit255_shift && mode != CompositingMode::average &&
            mode != CompositingMode::minip &&
-           !(plan.float32 && plan.compositing.is_unit255());  // t u / u is not always t
+           !(plan.float32 && (plan.compositing.is_unit255() ||  // t u / u is not always t
+                              plan.compositing.form == CompositingForm::straight));
 }
 
 void report_shading(Plan& plan) {

@@ -9,6 +9,7 @@
 #include "pipeline/stages/compositing.h"
 
 #include "core/rays-inl.h"
+#include "fixedpoint/quotients-inl.h"
 #include "fixedpoint/unrolled-inl.h"
 
 #include <hwy/highway.h>
@@ -55,8 +56,10 @@ HWY_INLINE std::array<D, 4> color_of(const CompositingStage& s, const Accumulate
     const double unit = static_cast<double>(s.unit());
     const D t = s.form == CompositingForm::alpha ? D(unit) - pixel.transparency : pixel.transparency;
     const Divisor of_color(static_cast<double>(s.color_unit()));
-    return {pixel.color[0] / of_color, pixel.color[1] / of_color, pixel.color[2] / of_color,
-            D(1) - t / Divisor(unit)};
+    const D alpha = D(1) - t / Divisor(unit);
+    const D share = s.form == CompositingForm::straight ? alpha : D(1);
+    return {pixel.color[0] / of_color * share, pixel.color[1] / of_color * share,
+            pixel.color[2] / of_color * share, alpha};
 }
 
 /// Whether a ray continues: T >= threshold.
@@ -98,6 +101,20 @@ HWY_INLINE void composite(const CompositingStage& s, Accumulated<W>& pixel, std:
         const int finer = std::max(s.contribution_fraction - s.transparency_fraction, 0);
         const int coarser = std::max(s.transparency_fraction - s.contribution_fraction, 0);
         t = quantise(shift_left(t, finer) - shift_left(w, coarser), s.to_transparency);
+        return;
+    }
+    if (s.form == CompositingForm::straight) {
+        const W before = one - t;
+        const W next =
+            quantise(t * (constant<W>(std::int64_t{1} << s.alpha_fraction) - alpha), s.to_transparency);
+        const W after = divisor<W>(one - next);
+        const W share = s.premultiplied ? t : max(t - next, constant<W>(0));
+        for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
+            const W kept = shift_left(pixel.color[c] * before, s.numerator_fraction - s.sum_fraction);
+            const W added = shift_left(color[c] * share, s.numerator_fraction - s.color_fraction);
+            pixel.color[c] = divide(kept + added, after, s.to_color);
+        });
+        t = next;
         return;
     }
     if (!s.premultiplied)

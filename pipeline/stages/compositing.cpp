@@ -48,7 +48,8 @@ CompositingStage build_compositing(const StageInputs& in) {
     s.transparency_fraction = fraction(in, Wire::transparency);
     s.sum_fraction = fraction(in, Wire::color);
     const int t = s.transparency_fraction;
-    const bool carries_alpha = s.premultiplied || s.takes_from_transparency();
+    const bool carries_alpha =
+        s.premultiplied || s.takes_from_transparency() || s.form == CompositingForm::straight;
     s.to_slab_color = rescale(in, incoming + s.alpha_fraction, Wire::slab_color);
     s.color_fraction = carries_alpha ? incoming : fraction(in, Wire::slab_color);
     s.to_contribution = rescale(in, s.alpha_fraction + t, Wire::contribution);
@@ -68,6 +69,12 @@ CompositingStage build_compositing(const StageInputs& in) {
             break;
         case CompositingForm::back_to_front:
             s.to_color = rescale(in, s.sum_fraction + s.alpha_fraction, Wire::color);
+            s.to_transparency = rescale(in, t + s.alpha_fraction, Wire::transparency);
+            break;
+        case CompositingForm::straight:
+            s.numerator_fraction = std::max(s.sum_fraction, s.color_fraction);
+            s.to_color = rescale(in, s.numerator_fraction, Wire::color);
+            s.to_color.divides = true;
             s.to_transparency = rescale(in, t + s.alpha_fraction, Wire::transparency);
             break;
         default:

@@ -6,6 +6,8 @@
 //     equation_9      C += C_s T;  T = q(T (1 - alpha))        Squeeze, equation 9
 //     alpha           C += C_s (1 - A);  A += q((1 - A) alpha) front to back with opacity
 //     back_to_front   C = C_s + q(C (1 - alpha))               Squeeze, equation 6
+//     straight        C = q((C A + c (A' - A)) / A'), A = 1 - T, T as in equation 9: the buffer holds the straight
+//                     colour, a division a slab (section 4.1.2.1)
 //     unit255_*       1.0 is 2^F - 1: a bare shift loses one in 256 at every product, Blinn's multiply
 //                     (equation 1) does not
 #pragma once
@@ -25,6 +27,7 @@ struct CompositingStage {
     bool premultiplied = false;  // the slab's colour is
     int alpha_fraction = 0, color_fraction = 0, contribution_fraction = 0, transparency_fraction = 0;
     int sum_fraction = 0;                       // of C
+    int numerator_fraction = 0;                 // straight: of both terms of C A', less T's
     bool of_units = false;                      // proven: slabs' colours and opacities lie in 0 to 1
     Rescale to_contribution;                    // alpha T
     Rescale to_transparency;                    // T - w, T (1 - alpha), or (1 - A) alpha

@@ -34,6 +34,9 @@ InterpolationStage build_interpolation(const StageInputs& in) {
     s.to_y = rescale(in, fraction(in, Wire::lerp_x) + s.weight_bits, Wire::lerp_y);
     s.to_sample = rescale(in, fraction(in, Wire::lerp_y) + s.weight_bits, Wire::sample);
     s.sample_fraction = fraction(in, Wire::sample);
+    s.to_x_sum = limits_of(in, Wire::lerp_x), s.to_y_sum = limits_of(in, Wire::lerp_y),
+    s.to_sum = limits_of(in, Wire::sample);
+    s.two_products = in.scene.sampling.lerp == LerpRule::two_products;
     s.nearest = in.scene.sampling.interpolation == InterpolationRule::nearest;
     return s;
 }

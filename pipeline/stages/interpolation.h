@@ -1,5 +1,5 @@
 // Stage 2: interpolation.  Eight corners (I.0) and cell weights (1.F) -> sample (I.F).  Squeeze, section 4.5,
-// equation 15.
+// equation 15; or equation 13, whose two products are rounded each.
 #pragma once
 
 #include "fixedpoint/words.h"
@@ -15,10 +15,12 @@ struct InterpolationStage {
     Rescale to_x, to_y, to_sample;
     int sample_fraction = 0;
     bool nearest = false;
+    bool two_products = false;           // equation 13
+    Rescale to_x_sum, to_y_sum, to_sum;  // its sums: limits alone
 
     template <class V>
     void visit(V&& v) {
-        v(to_x), v(to_y), v(to_sample);
+        v(to_x), v(to_y), v(to_sample), v(to_x_sum), v(to_y_sum), v(to_sum);
     }
 };
 /// Builds the stage's constants.  Throws InputError where a wire cannot hold the scalars or a weight of one.

@@ -19,10 +19,36 @@ std::vector<WireFormats> every_wire(const PresetInputs& in) {
 // The member of WireFormats for a preset; null if the name is unknown.
 Spec WireFormats::*preset_member(std::string_view name) {
     if (name == "default") return &WireFormats::standard;
-    if (name == "squeeze") return &WireFormats::squeeze;
+    for (const std::string_view like_squeeze : {"squeeze", "volumepro", "vizard2", "ultravis"})
+        if (name == like_squeeze) return &WireFormats::squeeze;
     if (name == "eight_bit") return &WireFormats::eight_bit;
     if (name == "wide" || rounds_nothing(name)) return &WireFormats::wide;
     return nullptr;
+}
+
+// Earlier systems as Squeeze's section 2 describes them; what it does not name is as in its own table.
+
+/// The VolumePro chip: 12 bits throughout.  Numbers from 0 to 1 have 12 fraction bits, so that 1.0 is one.
+void make_volumepro(WireSpecs& w) {
+    for (const Wire wire : {Wire::lerp_x, Wire::lerp_y, Wire::sample, Wire::gradient_lerp, Wire::gradient})
+        w[wire].format.fraction_bits = 0;
+    for (const Wire wire :
+         {Wire::length, Wire::confidence, Wire::table_color, Wire::table_alpha, Wire::table_extinction,
+          Wire::table_moment, Wire::slab_depth, Wire::slab_ratio, Wire::slab_alpha, Wire::slab_color,
+          Wire::light, Wire::dot, Wire::power, Wire::material, Wire::intensity, Wire::lit_color,
+          Wire::contribution, Wire::color, Wire::transparency})
+        w[wire].format.fraction_bits = 12;
+}
+/// The Vizard II board: 16-bit words in compositing, 16 bits of an opacity and 8 of a colour in the tables.
+void make_vizard2(WireSpecs& w) {
+    w[Wire::table_color].format = {0, 8, false}, w[Wire::table_alpha].format = {0, 16, false};
+}
+/// The UltraVis system: data of 8 bits, buffers of colour and transparency of 16.
+void make_ultravis(const PresetInputs& in, WireSpecs& w) {
+    for (const Wire wire : {Wire::lerp_x, Wire::lerp_y, Wire::sample})
+        w[wire].format = {in.scalar_bits, 0, false};
+    w[Wire::classification_input].format = {in.entry_bits, 0, false};
+    w[Wire::gradient_lerp].format = w[Wire::gradient].format = {in.scalar_bits, 1, true};
 }
 
 }  // namespace
@@ -47,6 +73,9 @@ bool preset_specs(std::string_view name, const PresetInputs& inputs, WireSpecs& 
     const auto preset = preset_member(name);
     if (!preset) return false;
     for (const WireFormats& formats : every_wire(inputs)) specs[formats.wire] = formats.*preset;
+    if (name == "volumepro") make_volumepro(specs);
+    if (name == "vizard2") make_vizard2(specs);
+    if (name == "ultravis") make_ultravis(inputs, specs);
     return true;
 }
 
@@ -58,7 +87,8 @@ std::string preset_table_markdown() {
                                    .ray_bits = 9,
                                    .depth_bits = 3,
                                    .total_depth_bits = 12};
-    const std::vector<std::string> presets{"default", "squeeze", "eight_bit", "wide"};
+    const std::vector<std::string> presets{"default", "squeeze",  "eight_bit", "volumepro",
+                                           "vizard2", "ultravis", "wide"};
     std::vector<WireSpecs> specs(presets.size());
     std::string table = "| stage | wire | carries |", rule = "|---|---|---|";
     for (std::size_t p = 0; p < presets.size(); ++p) {

@@ -138,7 +138,8 @@ TEST(SceneFile, ListsTheNamesOfAnEnumeration) {
     EXPECT_THAT(refusal_of_file("[transfer_function]\npreset = 'ct_bnoe'\n"),
                 HasSubstr("did you mean \"ct_bone\"?; allowed: "));
     EXPECT_EQ(refusal("[precision]\npreset = 'fast'\n"),
-              "s.toml:5:10: precision.preset: found \"fast\"; allowed: default, squeeze, eight_bit, wide, "
+              "s.toml:5:10: precision.preset: found \"fast\"; allowed: default, squeeze, eight_bit, "
+              "volumepro, vizard2, ultravis, wide, "
               "real or float32, or the path of "
               "a preset file");
 }

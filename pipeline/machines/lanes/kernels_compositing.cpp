@@ -6,6 +6,7 @@
 #include <hwy/foreach_target.h>
 
 #include "fixedpoint/words/float_lanes-inl.h"
+#include "fixedpoint/words/lane_quotients-inl.h"
 #include "fixedpoint/words/lanes-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/machines/lanes/plain.h"

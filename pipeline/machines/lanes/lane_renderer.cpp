@@ -193,6 +193,9 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
     if (const auto obstacle = too_wide("classification input", plan.input_needs)) return obstacle;
     if (plan.lit && plan.specs[Wire::normal].overflow == Overflow::wrap)
         return "a normal that wraps round is divided by the model";
+    if (plan.compositing.form == CompositingForm::straight &&
+        plan.specs[Wire::color].overflow == Overflow::wrap)
+        return "a straight colour that wraps round is divided by the model";
     if (plan.gradient.fades && plan.specs[Wire::confidence].overflow == Overflow::wrap)
         return "a confidence that wraps round is divided by the model";
     std::vector<Wire> stored{

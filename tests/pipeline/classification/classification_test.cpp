@@ -315,5 +315,24 @@ TEST(ClassificationMethods, PrefixSumsBeyondTheirFormatAreRefused) {
     EXPECT_THROW(build_method({dense, specs, settings, 1, 8}), InputError);
 }
 
+// Squeeze, section 4.4.2: R G B in 8 bits and T in 15.
+TEST(Classification, EntriesMayStoreTheirTransparency) {
+    const Entries entries = pre::cases::noise(256, 1e-3, 2, 5);
+    Classifier c = make_classifier(entries, {Method::pc}, "squeeze");
+    ClassificationSettings settings;
+    settings.encoding = AlphaEncoding::transparency;
+    for (const char* format : {"u1.15 trn", "u1.8 rnd"}) {
+        ASSERT_EQ(parse_spec(format, c.specs[Wire::table_alpha]), "");
+        const Spec spec = c.specs[Wire::table_alpha];
+        const EntryLookup lookup = build_entry_lookup({c.entries, c.specs, settings, 1, c.input_fraction});
+        for (int i = 0; i < entries.size(); ++i) {
+            const double transparency = std::exp(-entries.entry[static_cast<std::size_t>(i)].extinction);
+            ASSERT_EQ(lookup.table.word(i << lookup.row_bits, EntryLookup::alpha),
+                      spec.format.one() - quantise_real(transparency, spec))
+                << format << ' ' << i;
+        }
+    }
+}
+
 }  // namespace
 }  // namespace squint

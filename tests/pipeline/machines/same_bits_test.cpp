@@ -217,6 +217,7 @@ Case draw_case(unsigned seed, const std::string& preset) {
     scene.sampling.termination = draw.one_of({1.0 / 1024, 0.0, draw.real(0, 0.999), 0.99});
     scene.sampling.position = draw.any_of<PositionRule>();
     if (draw.once_in(6)) scene.sampling.interpolation = InterpolationRule::nearest;
+    if (draw.once_in(6)) scene.sampling.lerp = LerpRule::two_products;
     scene.classification = {};
     ClassificationSettings& method = scene.classification;
     method.method = draw.one_of({Method::pc, Method::pc_mid, draw.any_of<Method>(), draw.any_of<Method>()});
@@ -229,7 +230,7 @@ Case draw_case(unsigned seed, const std::string& preset) {
     method.table_size = 64;
     method.lookup = draw.any_of<TableLookup>();
     method.opaque_prediction = !draw.once_in(8);
-    if (draw.once_in(5)) scene.classification.encoding = AlphaEncoding::sqrt_alpha;
+    if (draw.once_in(5)) method.encoding = draw.any_of<AlphaEncoding>();
     if (draw.once_in(6)) scene.compositing.mode = draw.any_of<CompositingMode>();
     scene.compositing.form = draw.any_of<CompositingForm>();
     if (!preset.empty()) {
@@ -263,6 +264,9 @@ std::vector<Share> shares() {
         {"light at the middle", [](const Plan& p) { return p.inside.rule == InsideRule::middle; }},
         {"light that fades in", [](const Plan& p) { return p.gradient.fades; }},
         {"gooch", [](const Plan& p) { return p.lit && p.shading.model == ShadingModel::gooch; }},
+        {"straight colours", [](const Plan& p) { return p.compositing.form == CompositingForm::straight; }},
+        {"lerps of two products",
+         [](const Plan& p) { return p.interpolation.two_products && !p.interpolation.nearest; }},
         {"one voxel thick along x", [](const Plan& p) { return p.volume->dims.x == 1; }},
         {"turned", [](const Plan& p) { return p.volume->turned(); }},
         {"turned and clipped", [](const Plan& p) { return p.clip.has_value(); }},

@@ -411,5 +411,70 @@ TEST(Compositing, IntervalsHoldEveryPixel) {
     }
 }
 
+// Squeeze, section 4.1.2.1: the buffer holds the straight colour.
+CompositingStage straight_stage(int bits, Rounding rounding) {
+    CompositingStage s = stage_of(straight, bits, rounding);
+    s.sum_fraction = s.numerator_fraction = bits;
+    s.to_color = Rescale(bits, {{1, bits, false}, rounding, Overflow::sat});
+    s.to_color.divides = true;
+    return s;
+}
+
+TEST(Compositing, AStraightColourOfEvenMatterStaysItself) {
+    for (const Rounding rounding : {Rounding::trn, Rounding::rnd, Rounding::rnd_conv})
+        for (const int bits : {8, 15}) {
+            const CompositingStage s = straight_stage(bits, rounding);
+            const Word one = Word{1} << bits;
+            for (const Word color : {Word{0}, Word{1}, one / 3, one}) {
+                Pixel pixel = nothing_yet<Word>(s);
+                for (int i = 0; i < 300; ++i) add(s, pixel, color, 1 + i % 7);
+                EXPECT_EQ(pixel.color[0], color) << bits;
+            }
+        }
+}
+
+TEST(Compositing, AStraightColourIsLeftAloneByNothingAndReplacedByNoneBehindAWall) {
+    const CompositingStage s = straight_stage(15, Rounding::rnd_conv);
+    const Word one = Word{1} << 15;
+    Pixel pixel = nothing_yet<Word>(s);
+    add(s, pixel, one, 0);  // opacity zero over zero
+    EXPECT_EQ(pixel.color[0], 0);
+    EXPECT_EQ(pixel.transparency, one);
+    add(s, pixel, 12345, 777);
+    const Pixel before = pixel;
+    add(s, pixel, one, 0);
+    EXPECT_EQ(pixel.color, before.color);
+    EXPECT_EQ(pixel.transparency, before.transparency);
+    add(s, pixel, 20000, one);
+    EXPECT_EQ(pixel.transparency, 0);
+    const Pixel wall = pixel;
+    add(s, pixel, one, one / 2);
+    EXPECT_EQ(pixel.color, wall.color);
+}
+
+// Slab k's division rounds C by half a last bit at most, and what is gathered is C A: N slabs, A <= 1, leave
+// N / 2 last bits beside the sum of c (T - T') over the T that the buffer holds.
+TEST(Compositing, AStraightColourTimesItsOpacityIsTheSumWithinHalfALastBitASlab) {
+    std::mt19937_64 random(5);
+    constexpr int kBits = 15, kSlabs = 200;
+    const CompositingStage s = straight_stage(kBits, Rounding::rnd_conv);
+    for (int ray = 0; ray < 200; ++ray) {
+        Pixel pixel = nothing_yet<Word>(s);
+        double sum = 0;
+        for (int k = 0; k < kSlabs; ++k) {
+            const Word before = pixel.transparency, color = static_cast<Word>(random() % 32769);
+            add(s, pixel, color, static_cast<Word>(random() % (ray % 2 ? 600 : 40)));
+            sum += static_cast<double>(color) * static_cast<double>(before - pixel.transparency);
+        }
+        const double gathered =
+            static_cast<double>(pixel.color[0]) * static_cast<double>(s.unit() - pixel.transparency);
+        ASSERT_NEAR(gathered / 32768, sum / 32768, kSlabs / 2.0);
+        const std::array<double, 4> shown =
+            color_of(s, Accumulated<double>{{static_cast<double>(pixel.color[0]), 0, 0},
+                                            static_cast<double>(pixel.transparency)});
+        ASSERT_DOUBLE_EQ(shown[0], gathered / 32768 / 32768);
+    }
+}
+
 }  // namespace
 }  // namespace squint

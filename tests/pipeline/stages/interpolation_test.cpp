@@ -218,5 +218,27 @@ TEST(Interpolation, IntervalsHoldEveryCellsSample) {
     }
 }
 
+// Squeeze, equation 13, cut: a last bit is lost wherever a product is not whole.
+TEST(Interpolation, TwoCutProductsOfEqualEndsLoseALastBitUnlessTheyAreWhole) {
+    const Spec spec = unsigned_spec(12, 0, Rounding::trn);
+    const Rescale to(12, spec), to_sum(0, spec);
+    for (const Word v : {Word{1}, Word{7}, Word{2048}, Word{4095}})
+        for (Word weight = 0; weight <= 4096; ++weight)
+            ASSERT_EQ(lerp_of_two_products(v, v, weight, 12, to, to_sum),
+                      v - (v * weight % 4096 != 0 ? 1 : 0))
+                << v << ' ' << weight;
+}
+
+TEST(Interpolation, TwoProductsAreOneWhereNothingIsRounded) {
+    const Spec spec = unsigned_spec(8, 12, Rounding::trn);
+    const Rescale to(12, spec), to_sum(12, spec);
+    std::mt19937_64 random(3);
+    for (int i = 0; i < 20000; ++i) {
+        const auto v0 = static_cast<Word>(random() % 256), v1 = static_cast<Word>(random() % 256),
+                   weight = static_cast<Word>(random() % 4097);
+        ASSERT_EQ(lerp_of_two_products(v0, v1, weight, 12, to, to_sum), lerp(v0, v1, weight, 12, to));
+    }
+}
+
 }  // namespace
 }  // namespace squint

@@ -133,5 +133,25 @@ TEST(Presets, AnUnknownNameIsRefused) {
     EXPECT_FALSE(preset_specs("defualt", {}, w));
 }
 
+// Squeeze, section 2.
+TEST(Presets, EarlierSystemsHaveTheBitsThatTheirPapersSay) {
+    WireSpecs volumepro, vizard2, ultravis;
+    ASSERT_TRUE(preset_specs("volumepro", {}, volumepro));
+    ASSERT_TRUE(preset_specs("vizard2", {}, vizard2));
+    ASSERT_TRUE(preset_specs("ultravis", {.scalar_bits = 8, .entry_bits = 8}, ultravis));
+    for (int i = 0; i < kWires; ++i) {
+        const auto wire = static_cast<Wire>(i);
+        EXPECT_LE(volumepro[wire].format.fraction_bits, 12) << info(wire).name;
+    }
+    EXPECT_EQ(to_string(volumepro[Wire::sample]), "u12.0 trn sat");
+    EXPECT_EQ(to_string(vizard2[Wire::table_color]), "u0.8 trn sat");
+    EXPECT_EQ(to_string(vizard2[Wire::table_alpha]), "u0.16 trn sat");
+    EXPECT_EQ(to_string(vizard2[Wire::transparency]), "u1.15 trn sat");
+    EXPECT_EQ(to_string(ultravis[Wire::sample]), "u8.0 trn sat");
+    EXPECT_EQ(to_string(ultravis[Wire::color]), "u1.15 trn sat");
+    for (const char* name : {"volumepro", "vizard2", "ultravis"})
+        EXPECT_EQ(preset_form(name), CompositingForm::equation_9) << name;
+}
+
 }  // namespace
 }  // namespace squint

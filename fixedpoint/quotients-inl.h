@@ -1,0 +1,42 @@
+// Quotients over any word, whatever their wire has; compiled once per SIMD target.
+#if defined(SQUINT_FIXEDPOINT_QUOTIENTS_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_FIXEDPOINT_QUOTIENTS_INL_H
+#undef SQUINT_FIXEDPOINT_QUOTIENTS_INL_H
+#else
+#define SQUINT_FIXEDPOINT_QUOTIENTS_INL_H
+#endif
+
+#include "fixedpoint/words.h"
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <type_traits>
+
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+
+/// A quotient whatever its wire: where the wire has fewer fraction bits than the exact quotient, the
+/// denominator is shifted.
+template <class N>
+HWY_INLINE auto divide(const N& numerator, const N& denominator, const Rescale& to) {
+    Rescale whole = to;
+    whole.shift = std::min(to.shift, 0);
+    return quotient(numerator, to.shift > 0 ? N(shift_left(denominator, to.shift)) : denominator, whole);
+}
+
+/// What a quotient may divide by: x >= 0, or a last bit where it is zero.  Without rounding every x above zero
+/// is itself.  N: the word or its Wide.
+template <class W, class N>
+HWY_INLINE N divisor(const N& x) {
+    if constexpr (RealWord<W>)
+        return select(constant<W>(0) < x, x, constant<W>(1));
+    else if constexpr (std::is_same_v<N, W>)
+        return max(x, constant<W>(1));
+    else
+        return max(x, widen(constant<W>(1)));
+}
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif
