@@ -293,6 +293,9 @@ void visit_scene(S& scene, V&& visit) {
         "what of an opacity is stored in table_alpha's format: alpha, sqrt_alpha or transparency, 1 - alpha");
     visit("classification.opaque_prediction", classification.opaque_prediction,
           "find opaque values inside a slab");
+    visit("classification.as_printed", classification.as_printed,
+          "pips as Lee & Shin print it: sums by rectangles, the series at every depth, poles and all, opaque "
+          "prediction one way only");
     visit("compositing.mode", scene.compositing.mode, "over, mip, minip or average");
     visit("compositing.form", scene.compositing.form,
           "w, w_carry (remainders carried on), equation_9, alpha, back_to_front, unit255_shift, "

@@ -25,13 +25,17 @@ struct Step {
     double depth;
     std::array<double, 3> light;
 };
-std::vector<Step> steps_of(const Entries& entries) {
+std::vector<Step> steps_of(const Entries& entries, bool as_printed) {
     std::vector<Step> steps;
     steps.reserve(entries.entry.size());
     for (std::size_t i = 0; i + 1 < entries.entry.size(); ++i) {
         const Entry &a = entries.entry[i], &b = entries.entry[i + 1];
         const double t0 = a.extinction, t1 = b.extinction;
         Step step{(t0 + t1) / 2, {}};
+        if (as_printed) {  // rectangles
+            steps.push_back({t0, {a.color.x * t0, a.color.y * t0, a.color.z * t0}});
+            continue;
+        }
         for (int c = 0; c < 3; ++c)  // exact for linear colour and extinction
             step.light[static_cast<std::size_t>(c)] =
                 (2 * a.color[c] * t0 + 2 * b.color[c] * t1 + a.color[c] * t1 + b.color[c] * t0) / 6;
@@ -129,7 +133,7 @@ std::int64_t all_rows(int steps) {
 }
 
 void fill_moments(MomentSeries& m, const Entries& fine, const Spec& spec, bool keeps_exact) {
-    const std::vector<Step> steps = steps_of(fine);
+    const std::vector<Step> steps = steps_of(fine, m.prefix.as_printed);
     const int count = static_cast<int>(steps.size()), columns = 1 + 3 * m.order;
     const int levels = level_count(count);
     m.levels = Table(levels, 1);
@@ -188,7 +192,7 @@ double power_series_weight(int order, int j, double x) {
         below += power / factorial(k + 1);
         if (k >= j) above += power * (2 * j + 1) * factorial(k) / (factorial(k - j) * factorial(k + j + 1));
     }
-    return above / below;
+    return below == 0 ? std::copysign(1e6, above) : above / below;  // at a pole: any word's limit
 }
 
 Table computed_weights(int order, bool legendre, double deepest, int row_bits, const Spec& spec) {
@@ -295,10 +299,13 @@ MomentSeries build_moment_series(const ClassificationInputs& in) {
     // Weights, and the depth up to which they are good.
     m.depth_fraction = depth.format.fraction_bits;
     m.row_bits = std::min(10, m.depth_fraction);
-    const double limit =
-        legendre ? preintegration::legendre_split_depth(m.order) : preintegration::trusted_depth(m.order);
+    constexpr double kAsPrinted = 16;  // deep: there the weights have nearly reached those of any depth
+    const bool as_printed = m.prefix.as_printed;
+    const double limit = as_printed ? std::ldexp(1.0, depth.format.integer_bits)
+                         : legendre ? preintegration::legendre_split_depth(m.order)
+                                    : preintegration::trusted_depth(m.order);
     m.limit = quantise_real(limit, {depth.format, Rounding::rnd, Overflow::sat});
-    fill_weights(m, legendre, legendre ? 8 : limit);
+    fill_weights(m, legendre, as_printed ? std::min(limit, kAsPrinted) : legendre ? 8 : limit);
     const int ratio_wire = static_cast<int>(Wire::slab_ratio);
     m.to_ratio = Rescale(m.word_fraction + m.weight_fraction, ratio, ratio_wire);
     const preintegration::ColorRange range = preintegration::color_range(in.entries);
@@ -306,6 +313,9 @@ MomentSeries build_moment_series(const ClassificationInputs& in) {
     for (int c = 0; c < 3; ++c) {
         m.lowest[static_cast<std::size_t>(c)] = quantise_real(range.low[c], nearest);
         m.highest[static_cast<std::size_t>(c)] = quantise_real(range.high[c], nearest);
+        if (as_printed)  // no clamp but the word's own limits
+            m.lowest[static_cast<std::size_t>(c)] = 0,
+            m.highest[static_cast<std::size_t>(c)] = ratio.format.largest();
     }
 
     // How deep slabs are cut.
@@ -314,6 +324,11 @@ MomentSeries build_moment_series(const ClassificationInputs& in) {
     m.to_piece = Rescale(2 * alpha.format.fraction_bits, alpha, static_cast<int>(Wire::slab_alpha));
     m.to_whole = Rescale(ratio.format.fraction_bits, ratio, ratio_wire);
 
+    if (as_printed) {
+        m.note = fmt::format(
+            "PIPS({}) as printed: no depth is redirected, and no colour is limited but by its word", m.order);
+        return m;
+    }
     if (legendre) {
         m.note = fmt::format(
             "LEG({}): overlapped level tables of {} bits, which do not cancel; {} sub-entries an entry (the "

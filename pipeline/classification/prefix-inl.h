@@ -71,7 +71,7 @@ template <class W>
 struct CutSlab {
     EntryPosition<W> front, end;  // the translucent part
     W front_input, end_input;
-    W span;  // |s_b - s_f| of the whole slab: its rate is kept
+    W span;  // |s_b - s_f| of the whole slab: its rate is kept; as printed, of the part
     W wall;  // 1 where an opaque entry ends the slab
     W wall_entry;
 };
@@ -87,8 +87,10 @@ HWY_INLINE CutSlab<W> cut_at_wall(const PrefixLookup& p, W front, W back) {
         const W wall =
             select(ascending, gather(p.walls, above, 0), gather(p.walls, floor_shift(front, bits), 1));
         const W place = shift_left(wall, bits);
-        const auto hit = (ascending & (!(back < place))) | ((!ascending) & (!(place < back)));
+        const auto hit = p.as_printed ? ascending & (place < back)
+                                      : (ascending & (!(back < place))) | ((!ascending) & (!(place < back)));
         end = select(hit, place, back);
+        if (p.as_printed) cut.span = absolute(end - front);
         cut.wall = select(hit, one, zero);
         cut.wall_entry = select(hit, wall, zero);
     }
@@ -181,7 +183,7 @@ HWY_INLINE W wall_color(const EntryLookup& e, const CutSlab<W>& cut, int channel
 template <class W>
 HWY_INLINE auto is_point(const PrefixLookup& p, const CutSlab<W>& cut) {
     const auto equal = cut.span == constant<W>(0);
-    return p.predicts ? equal | is_opaque(p.entries, cut.front) : equal;
+    return p.predicts && !p.as_printed ? equal | is_opaque(p.entries, cut.front) : equal;
 }
 
 /// Finishes a slab: one with equal ends is classified as a point; behind a wall nothing is seen.  `part` is

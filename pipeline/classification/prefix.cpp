@@ -32,6 +32,7 @@ double lost_by_straight_lines(const Entries& rows, double step, double longest_r
 }  // namespace
 
 EntryRows rows_for_color(const ClassificationInputs& in, int most_rows) {
+    if (is_as_printed(in.settings)) return {};
     double worst = largest_swing(in.entries.entry) * 2 / 3;
     if (worst <= kInsideEntry) return {0, 255 * worst};
     worst = kInsideEntry;  // never less: one row is enough for that
@@ -51,6 +52,10 @@ EntryRows rows_for_color(const ClassificationInputs& in, int most_rows) {
            (in.entries.size() - 1) << (bits + 1) <= most_rows)
         ++bits;
     return {bits, 255 * std::ldexp(worst, -bits)};
+}
+
+bool is_as_printed(const ClassificationSettings& settings) {
+    return settings.as_printed && settings.method == Method::pips;
 }
 
 std::int64_t most_rise_of(const Table& sums, int columns) {
@@ -73,14 +78,15 @@ PrefixLookup build_prefix_lookup(const ClassificationInputs& in, int sub_entry_b
     p.sub_entry_bits = sub_entry_bits;
     const auto extinction_of = [&](int i) { return fine.entry[static_cast<std::size_t>(i)].extinction; };
     std::vector<double> depths(static_cast<std::size_t>(rows));
+    p.as_printed = is_as_printed(in.settings);
     double sum = 0;  // trapezoids: exact for linear extinction
     for (int i = 0; i + 1 < rows; ++i) {
-        const double a = extinction_of(i), b = extinction_of(i + 1);
+        const double a = extinction_of(i), b = p.as_printed ? a : extinction_of(i + 1);
         sum += 0.5 * (a + b);
         depths[static_cast<std::size_t>(i) + 1] = sum * step;
     }
     const double lost = lost_by_straight_lines(fine, in.step_world, in.longest_ray);
-    p.curved = lost > kMayBeLeftOut && p.place_bits() > 0;
+    p.curved = lost > kMayBeLeftOut && p.place_bits() > 0 && !p.as_printed;
     if (!p.curved) p.straight = {"T straight between its rows", lost};
     const std::size_t columns = p.curved ? 2 : 1;
     if (p.curved) {
@@ -113,7 +119,7 @@ PrefixLookup build_prefix_lookup(const ClassificationInputs& in, int sub_entry_b
         p.walls = Table(n, 2);
         for (int i = 0; i < n; ++i) {
             p.walls.set_raw(i, 0, prediction.up[static_cast<std::size_t>(i)]);
-            p.walls.set_raw(i, 1, prediction.down[static_cast<std::size_t>(i)]);
+            p.walls.set_raw(i, 1, p.as_printed ? -1 : prediction.down[static_cast<std::size_t>(i)]);
         }
     }
     return p;

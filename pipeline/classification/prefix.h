@@ -24,6 +24,8 @@ struct PrefixLookup {
     Rescale to_wall;             // the colour in front of a wall over the wall's
     Approximation straight;      // of T, where it does not bend
     bool predicts = false;
+    bool as_printed =
+        false;    // sums by rectangles; P serves ascending slabs, strictly, and d is not shortened
     Table walls;  // up, down: the nearest opaque entry at or above, at or below; absent if none is opaque
 
     template <class V>
@@ -40,12 +42,20 @@ struct PrefixLookup {
                           : "prefix sum of the entries' optical depths");
         report.add(straight);
         report.add("walls", walls, "nearest opaque entry above and below");
+        if (as_printed)
+            report.notes.push_back(
+                "as printed: sums by rectangles, the series at every depth, and opaque prediction for "
+                "ascending "
+                "slabs alone, which misses an opaque end and keeps the whole slab's length");
         if (entries.has_opaque)
             report.notes.push_back(predicts
                                        ? "opaque prediction: the first opaque entry on a slab's way ends it"
                                        : "no opaque prediction, as asked: thin opaque surfaces are lost");
     }
 };
+
+/// Whether the errors of the paper are asked for, and the method is the paper's.
+bool is_as_printed(const ClassificationSettings& settings);
 
 /// The most that any of the first columns of prefix sums rises from row to row.
 std::int64_t most_rise_of(const Table& sums, int columns);

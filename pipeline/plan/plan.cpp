@@ -135,6 +135,9 @@ void plan_classification(Plan& plan) {
     ClassificationReport report;
     std::visit([&](const auto& m) { m.describe(report); }, plan.method);
     plan.tables = std::move(report.tables);
+    if (const ClassificationSettings& c = plan.scene.classification; c.as_printed && c.method != Method::pips)
+        report.notes.push_back(fmt::format(
+            "classification.as_printed is ignored: it is of pips, and the method is {}", name_of(c.method)));
     plan.notes.insert(plan.notes.end(), report.notes.begin(), report.notes.end());
     plan.approximations = std::move(report.approximations);
     if (const Approximation a = shorter_slabs(plan); a.lsb8 > 0) plan.approximations.push_back(a);

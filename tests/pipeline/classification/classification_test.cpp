@@ -334,5 +334,43 @@ TEST(Classification, EntriesMayStoreTheirTransparency) {
     }
 }
 
+Classifier as_printed(const Entries& entries, int order) {
+    Classifier c = make_classifier(entries, {Method::pips, order}, "default");
+    c.settings.as_printed = true;
+    c.method = build_method({c.entries, c.specs, c.settings, 1, c.input_fraction});
+    return c;
+}
+
+// docs/math.md#c4, 6: extinction 2, colour 1 falling to 0.  Moments of 1 - y are 1 / ((k + 1) (k + 2)), so the series of
+// order 3 gives (1/2 - 2/6 + 2/12) / (1 - 1 + 4/6) = 1/2, and that of order 2 divides by zero.  Rectangles shift the
+// colour by half an entry.
+TEST(Classification, AsPrintedTheSeriesHasItsPole) {
+    Entries entries = pre::cases::constant(256, 2, 0);
+    for (int i = 0; i < 256; ++i) entries.entry[static_cast<std::size_t>(i)].color = Vec3(1 - i / 255.0);
+    const SlabValue third = as_printed(entries, 3).slab(0, 255), second = as_printed(entries, 2).slab(0, 255);
+    const double alpha = 1 - std::exp(-2.0);
+    EXPECT_NEAR(third.alpha, alpha, 1e-3);
+    EXPECT_NEAR(third.color.x / alpha, 0.5, 0.5 / 255 + 1e-3);
+    EXPECT_GT(second.color.x / alpha, 1.5);  // as far as its word goes
+    const SlabValue mended = make_classifier(entries, {Method::pips, 2}, "default").slab(0, 255);
+    EXPECT_LE(mended.color.x, mended.alpha);
+}
+
+// docs/math.md#b6: ascending slabs alone, and strictly.
+TEST(Classification, AsPrintedPredictionMissesHalfTheWalls) {
+    Entries entries = pre::cases::constant(256, 0.01, 0.2);
+    pre::cases::make_opaque(entries, 128, {1, 0.5, 0});
+    for (const int order : {1, 3}) {
+        const Classifier printed = as_printed(entries, order),
+                         mended = make_classifier(entries, {Method::pips, order}, "default");
+        for (const auto& [front, back] : {std::pair{119, 137}, {137, 119}, {119, 128}, {128, 137}})
+            EXPECT_EQ(mended.slab(front, back).alpha, 1) << order << ' ' << front;
+        EXPECT_EQ(printed.slab(119, 137).alpha, 1) << order;
+        EXPECT_EQ(printed.slab(128, 137).alpha, 1) << order;
+        EXPECT_LT(printed.slab(137, 119).alpha, 1) << order;
+        EXPECT_LT(printed.slab(119, 128).alpha, 1) << order;
+    }
+}
+
 }  // namespace
 }  // namespace squint

@@ -231,6 +231,7 @@ Case draw_case(unsigned seed, const std::string& preset) {
     method.lookup = draw.any_of<TableLookup>();
     method.opaque_prediction = !draw.once_in(8);
     if (draw.once_in(5)) method.encoding = draw.any_of<AlphaEncoding>();
+    method.as_printed = draw.once_in(5);
     if (draw.once_in(6)) scene.compositing.mode = draw.any_of<CompositingMode>();
     scene.compositing.form = draw.any_of<CompositingForm>();
     if (!preset.empty()) {
@@ -267,6 +268,10 @@ std::vector<Share> shares() {
         {"straight colours", [](const Plan& p) { return p.compositing.form == CompositingForm::straight; }},
         {"lerps of two products",
          [](const Plan& p) { return p.interpolation.two_products && !p.interpolation.nearest; }},
+        {"pips as printed",
+         [](const Plan& p) {
+             return p.scene.classification.as_printed && p.scene.classification.method == Method::pips;
+         }},
         {"one voxel thick along x", [](const Plan& p) { return p.volume->dims.x == 1; }},
         {"turned", [](const Plan& p) { return p.volume->turned(); }},
         {"turned and clipped", [](const Plan& p) { return p.clip.has_value(); }},
