@@ -320,6 +320,21 @@ S sphere(const S& x, const S& y, const S& z) {
     return smooth_step(S(1) - sqrt(squared_length(Point<S>{x, y, z} - Vec3(0.5))) * S(2));
 }
 
+/// The ball with bumps: its distance is changed by three octaves of products of sines.
+template <class S>
+S noisy_sphere(const S& x, const S& y, const S& z) {
+    const auto bumps = [&](double frequency, double phase) {
+        const auto wave = [&](const S& a, double shift) {
+            return sin(a * S(2 * kPi * frequency) + S(shift));
+        };
+        return wave(x + y * S(0.31), phase) * wave(y + z * S(0.37), 2 * phase) *
+               wave(z + x * S(0.29), 3 * phase);
+    };
+    const S noise = bumps(4.1, 0.7) * S(0.012) + bumps(8.3, 1.9) * S(0.006) + bumps(15.7, 3.1) * S(0.003);
+    const S radius = sqrt(squared_length(Point<S>{x, y, z} - Vec3(0.5))) + noise;
+    return value_of(radius) >= 0.5 ? S(0) : smooth_step(S(1) - radius * S(2));
+}
+
 /// Marschner and Lobb 1994, section 5: f_M = 6, alpha = 0.25, over [-1, 1]^3.
 template <class S>
 S marschner_lobb(const S& x, const S& y, const S& z) {
@@ -402,6 +417,8 @@ const std::vector<ProceduralField>& procedural_fields() {
               [](auto x, auto y, auto z) { return fog(x, y, z); }),
         field("polynomial", "a sum of cubics whose isosurfaces open, close and split", 8, 64,
               [](auto x, auto y, auto z) { return polynomial(x, y, z); }),
+        field("noisy_sphere", "the ball with bumps of three sizes", 12, 128,
+              [](auto x, auto y, auto z) { return noisy_sphere(x, y, z); }),
     };
     return fields;
 }

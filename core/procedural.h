@@ -22,7 +22,7 @@ struct ProceduralField {
     std::function<Vec3(const Vec3&)> gradient;  // exact derivative of `value`
 };
 
-/// All fields: phantom, sphere, marschner_lobb, shells, ramp, constant, fog, polynomial.
+/// All fields: phantom, sphere, marschner_lobb, shells, ramp, constant, fog, polynomial, noisy_sphere.
 const std::vector<ProceduralField>& procedural_fields();
 const ProceduralField* find_procedural(std::string_view name);  // null if unknown
 
