@@ -533,6 +533,32 @@ void add_search(CLI::App& app, SearchArguments& a) {
         "  squint render head.toml --set precision.preset=$PWD/found/formats.toml && squint report found");
 }
 
+void add_reproduce(CLI::App& app, ReproduceArguments& a) {
+    CLI::App& verb = add_verb(app, "Studies", "reproduce",
+                              "Make the figures and tables of the papers beside the papers' own numbers");
+    verb.add_option("paper", a.paper, "squeeze, lee_shin, guetat, or all; what there is when left out")
+        ->type_name("PAPER");
+    verb.add_option("figure", a.figure, "One figure or table; all but the timed ones when left out")
+        ->type_name("FIGURE");
+    verb.add_option("-o,--output", a.output,
+                    "Folder for pictures and tables; what is there already is not made again")
+        ->type_name("FOLDER")
+        ->capture_default_str();
+    verb.add_option("--data", a.data, "Folder of the real volumes; default: SQUINT_DATA of the environment")
+        ->type_name("FOLDER");
+    verb.add_flag("--timed", a.timed, "The tables that measure time, too");
+    add_set(verb, a.overrides, "Set any key of every scene; may be repeated, the last wins");
+    add_size(verb, a.overrides);
+    verb.add_option("--threads", a.threads, "Threads; default: one a processor")
+        ->check(CLI::Range(1, 4096))
+        ->type_name("N");
+    add_json_flag(verb, a.json);
+    verb.add_flag("-q,--quiet", a.quiet, "No progress");
+    verb.footer(
+        "Examples:\n  squint reproduce\n  squint reproduce lee_shin figure_5\n"
+        "  squint reproduce guetat --data ~/volumes -o guetat");
+}
+
 struct HelpArguments {
     std::string verb, form;
     bool list = false;
@@ -684,6 +710,7 @@ Arguments parse(int argc, char** argv) {
     SweepArguments sweep;
     ReportArguments report;
     SearchArguments search;
+    ReproduceArguments reproduce;
     search.settings.folder = "found";
     add_render(app, render);
     add_compare(app, compare);
@@ -695,6 +722,7 @@ Arguments parse(int argc, char** argv) {
     add_sweep(app, sweep);
     add_search(app, search);
     add_report(app, report);
+    add_reproduce(app, reproduce);
     add_info(app, info);
     add_volume(app, volume);
     add_doctor(app, doctor);
@@ -746,6 +774,7 @@ Arguments parse(int argc, char** argv) {
     if (verb == "sweep") return sweep.command = command_text(argc, argv), sweep;
     if (verb == "report") return report;
     if (verb == "search") return search.settings.command = command_text(argc, argv), search;
+    if (verb == "reproduce") return reproduce;
     if (verb == "help") return Text{help_text(app, all, help)};
     throw InputError("no verb given; squint help lists them");
 }

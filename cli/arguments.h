@@ -89,6 +89,13 @@ struct SearchArguments {
     std::string guarantee = "views";
     bool json = false, quiet = false;
 };
+struct ReproduceArguments {
+    std::string paper, figure;  // empty: all of them; both empty: what there is is listed
+    std::string output = "reproduced", data;
+    std::vector<std::string> overrides;
+    int threads = 0;
+    bool timed = false, json = false, quiet = false;
+};
 struct Text {  // help or version: printed, and done
     std::string text;
 };
@@ -96,7 +103,7 @@ struct Text {  // help or version: printed, and done
 using Arguments =
     std::variant<RenderArguments, PlanArguments, PixelArguments, NumberArguments, CompareArguments,
                  InfoArguments, VolumeArguments, DoctorArguments, HardArguments, TableArguments,
-                 SweepArguments, ReportArguments, SearchArguments, Text>;
+                 SweepArguments, ReportArguments, SearchArguments, ReproduceArguments, Text>;
 
 /// Parses the command line.  Throws InputError: what was found, and where help is.
 Arguments parse(int argc, char** argv);
@@ -115,6 +122,7 @@ int run(const TableArguments& arguments);
 int run(const SweepArguments& arguments);
 int run(const ReportArguments& arguments);
 int run(const SearchArguments& arguments);
+int run(const ReproduceArguments& arguments);
 int run(const Text& text);
 
 }  // namespace squint::cli

@@ -19,6 +19,10 @@ std::vector<std::string> shelf() {
     return squint::shelf(folder());
 }
 
+std::vector<std::string> papers() {
+    return squint::papers(folder());
+}
+
 std::string file_of(const std::string& name) {
     return shelf_file(name, folder());
 }

@@ -13,4 +13,7 @@ std::string file_of(const std::string& name);
 /// "@lee_shin/figure_5" and all others, sorted; none where the folder is missing.
 std::vector<std::string> shelf();
 
+/// Files that say how the papers' figures are made, in order of name.
+std::vector<std::string> papers();
+
 }  // namespace squint::cli

@@ -132,6 +132,9 @@ class Slabs {
                           locate(plan_.location, ray_, k, 2)});
     }
 
+    /// Stage 3: the raw gradient at a sample.
+    const std::array<W, 3>& gradient(Sample<W>& sample) const { return gradient_of(sample); }
+
     /// Ends a projection.
     void project(const ProjectedRay<W>& ray) { pixel = projected(plan_, method_, ray, pixel, observer_); }
 

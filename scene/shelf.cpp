@@ -12,14 +12,27 @@ namespace squint {
 
 namespace fs = std::filesystem;
 
+namespace {
+constexpr const char* kPapers = "reproduce";  // neither scenes nor sweeps
+}
+
 std::vector<std::string> shelf(const std::string& folder) {
     std::vector<std::string> names;
     std::error_code ignored;
     for (fs::recursive_directory_iterator at(folder, ignored), end; at != end; at.increment(ignored))
-        if (at->path().extension() == ".toml")
+        if (at->path().extension() == ".toml" && at->path().parent_path().filename() != kPapers)
             names.push_back("@" + at->path().lexically_relative(folder).replace_extension().string());
     std::sort(names.begin(), names.end());
     return names;
+}
+
+std::vector<std::string> papers(const std::string& folder) {
+    std::vector<std::string> files;
+    std::error_code ignored;
+    for (const auto& entry : fs::directory_iterator(fs::path(folder) / kPapers, ignored))
+        if (entry.path().extension() == ".toml") files.push_back(entry.path().string());
+    std::sort(files.begin(), files.end());
+    return files;
 }
 
 std::string shelf_file(const std::string& name, const std::string& folder) {

@@ -36,7 +36,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr double kBlack[3] = {0, 0, 0};
-constexpr double kManyTurns = 8;  // slabs of a ray that turn far: black in a preview
+constexpr double kManyTurns = 64;  // slabs of a ray that turn far: black in a preview
 
 /// What was made before: items by name, each with the key of what it was made from.
 class Ledger {
