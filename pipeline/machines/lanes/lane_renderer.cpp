@@ -193,6 +193,10 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
     if (const auto obstacle = too_wide("classification input", plan.input_needs)) return obstacle;
     if (plan.lit && plan.specs[Wire::normal].overflow == Overflow::wrap)
         return "a normal that wraps round is divided by the model";
+    if (const int carried = plan.compositing.to_contribution.shift;
+        plan.compositing.form == CompositingForm::w_carry && carried > 31)
+        return fmt::format("a remainder of {} bits, which w_carry carries, is wider than a lane's 31",
+                           carried);
     if (plan.compositing.form == CompositingForm::straight &&
         plan.specs[Wire::color].overflow == Overflow::wrap)
         return "a straight colour that wraps round is divided by the model";
