@@ -116,5 +116,17 @@ TEST_F(Reproduce, NumbersAtASmallSizeAreTheseToTheDigit) {
         }
 }
 
+// A page a paper names every figure that is made, as `figure_5`.
+TEST_F(Reproduce, PagesNameEveryFigure) {
+    const std::map<std::string, std::string> pages{
+        {"squeeze", "squeeze.md"}, {"lee_shin", "lee-shin.md"}, {"guetat", "guetat.md"}};
+    const nlohmann::json list = squint("reproduce --json").json();
+    for (const auto& paper : list["papers"]) {
+        const std::string page = contents(kSource / "docs/papers" / pages.at(paper["paper"]));
+        for (const auto& figure : paper["figures"])
+            EXPECT_THAT(page, HasSubstr("`" + figure["figure"].get<std::string>() + "`"));
+    }
+}
+
 }  // namespace
 }  // namespace squint::test
