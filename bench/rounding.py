@@ -16,7 +16,7 @@ SCENES = {
     "cthead": ["configs/bench/cthead_translucent.toml"],
     "engine": ["configs/bench/engine_translucent.toml"],
     "bonsai": ["configs/bench/bonsai_translucent.toml"],
-    "built-in": [],
+    "built-in": ["--set", "classification.method=pc"],
 }
 LIGHT = {"unlit": ["--set", "shading.model=none"], "lit": []}
 PRESETS = ["default", "squeeze"]

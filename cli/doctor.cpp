@@ -25,7 +25,7 @@ constexpr const char* kSelfTestHash = "d5d997b12f72b1bf6e9e15d03f5390a2";
 std::string self_test(Path path) {
     const Scene scene =
         scene_with(built_in_scene(), {"volume.procedural=sphere", "volume.dims=24", "image.width=32",
-                                      "image.height=32", "output.fixed=true",
+                                      "image.height=32", "output.fixed=true", "classification.method=pc",
                                       "transfer_function.points=[[0, 0.2, 0.4, 0.9, 0.0], [2000, 0.9, 0.5, "
                                       "0.1, 0.6], [4095, 1.0, 1.0, 0.8, 0.9]]",
                                       "transfer_function.unit_distance=1"});

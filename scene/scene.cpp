@@ -112,7 +112,8 @@ Scene built_in_scene() {
         {3200, 0.90, 0.05, 0.04, 0.001}, {3450, 0.90, 0.03, 0.03, 0.6},   {4095, 0.90, 0.03, 0.03, 0.6},
     };
     scene.transfer_function.unit_distance = 1;
-    scene.camera.height = 132;  // the head fills the picture
+    scene.classification.method = Method::pips;  // post-classification draws rings on the skull
+    scene.camera.height = 132;                   // the head fills the picture
     scene.lights = {{.direction = Vec3(-0.2, -1, 0.9)}};
     scene.shading = {.ka = 0.3, .kd = 0.8, .ks = 0.3};
     return scene;

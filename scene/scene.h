@@ -323,7 +323,7 @@ void visit_light(L& light, V&& visit) {
     visit("color", light.color, "linear colour");
 }
 
-/// The scene rendered when none is named: the phantom with skin, bone and vessels, and one light.
+/// The scene rendered when none is named: the phantom with skin, bone and vessels, PIPS(1), and one light.
 Scene built_in_scene();
 
 /// Reads a scene file, then `key=value` overrides in order (TOML values; bare words are strings).  Throws

@@ -83,6 +83,7 @@ Scene data_scene(const std::string& name, bool lit, const std::vector<std::strin
 Scene phantom_scene(std::int64_t size, bool lit, const std::vector<std::string>& overrides) {
     std::vector<std::string> all{
         "volume.procedural=phantom",
+        "classification.method=pc",
         fmt::format("volume.dims=[{}]", size),
         "image.width=800",
         "image.height=800",

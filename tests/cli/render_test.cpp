@@ -42,7 +42,7 @@ TEST_F(Render, WritesExrPreviewAndRecord) {
     EXPECT_EQ(record["scene"]["image.width"], 24);
     EXPECT_EQ(record["scene"]["camera.eye"], nullptr);
     EXPECT_EQ(record["scene"]["sampling.step"], 1.0);
-    EXPECT_EQ(record["scene"]["classification.method"], "pc");
+    EXPECT_EQ(record["scene"]["classification.method"], "pips");
     EXPECT_TRUE(record["scene"]["lights"][0]["direction"].is_array());
     EXPECT_EQ(record["pictures"][0]["hash"].get<std::string>().size(), 32u);
 }

@@ -193,7 +193,7 @@ Counts counts_of(const Bill& bill) {
 }
 
 Plan plan_with(std::vector<std::string> settings) {
-    settings.insert(settings.begin(), "volume.dims=[16, 16, 16]");
+    settings.insert(settings.begin(), {"volume.dims=[16, 16, 16]", "classification.method=pc"});
     const Scene scene = scene_with(built_in_scene(), settings);
     return make_plan(scene, std::make_shared<const Volume>(load_volume(volume_source(scene))));
 }

@@ -137,7 +137,8 @@ class Search : public ::testing::Test {
 
     Settings small(const std::string& run) const {
         Settings s;
-        s.overrides = {"volume.dims=12", "image.width=10", "image.height=8", "camera.height=12", "lights=[]"};
+        s.overrides = {"volume.dims=12",   "image.width=10", "image.height=8",
+                       "camera.height=12", "lights=[]",      "classification.method=pc"};
         s.most_error = 1, s.views = 1, s.integer_bits = false, s.descent.restarts = 8;
         s.wires = {Wire::contribution, Wire::color, Wire::transparency};
         s.folder = (folder / run).string();

@@ -17,7 +17,8 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 const std::string kTiny =
-    "[base]\nvolume.dims = 12\nimage.width = 8\nimage.height = 8\ncamera.height = 12\nlights = []\n";
+    "[base]\nvolume.dims = 12\nimage.width = 8\nimage.height = 8\ncamera.height = 12\nlights = []\n"
+    "classification.method = 'pc'\n";
 
 SweepFile parsed(const std::string& text) {
     return parse_sweep(text, "s.toml", "");
@@ -184,7 +185,7 @@ TEST(SweepPoint, MeasuresNoErrorWhereNothingIsRounded) {
 TEST(SweepPoint, SeesThatTheWFormConservesAndEquation9DoesNot) {
     const SweepFile sweep = parsed(
         "[base]\nvolume.procedural = 'fog'\nvolume.dims = 64\nimage.width = 8\nimage.height = 8\n"
-        "camera.height = 60\nlights = []\ntransfer_function.unit_distance = 1\n"
+        "camera.height = 60\nlights = []\nclassification.method = 'pc'\ntransfer_function.unit_distance = 1\n"
         "transfer_function.points = [[0, 1, 1, 1, 0.004], [255, 1, 1, 1, 0.004]]\nsampling.termination = 0\n"
         "[[axis]]\nkey = 'compositing.form'\nvalues = ['w', 'equation_9']\n[measure]\nconservation = true\n");
     Evaluator evaluator(sweep, "");

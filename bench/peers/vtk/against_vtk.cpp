@@ -163,11 +163,12 @@ Json compare_case(const Case& c, const Settings& settings) {
 Json fog(const Settings& settings) {
     Json points = Json::array();
     for (double step = 1; step >= 1.0 / 32; step /= 2) {
-        const Scene scene = scene_with(
-            built_in_scene(), {"volume.procedural=fog",
-                               "transfer_function.points=[[0,1,1,1,0.0],[1,1,1,1,0.03],[255,1,1,1,0.03]]",
-                               "transfer_function.unit_distance=1", "image.width=200", "image.height=200",
-                               "lights=[]", fmt::format("sampling.step={}", step)});
+        const Scene scene =
+            scene_with(built_in_scene(),
+                       {"volume.procedural=fog",
+                        "transfer_function.points=[[0,1,1,1,0.0],[1,1,1,1,0.03],[255,1,1,1,0.03]]",
+                        "transfer_function.unit_distance=1", "image.width=200", "image.height=200",
+                        "lights=[]", "classification.method=pc", fmt::format("sampling.step={}", step)});
         const auto volume = volume_of(scene);
         const Plan plan = make_plan(scene, volume);
         const int every = static_cast<int>(settings.number("every"));

@@ -17,6 +17,7 @@ Plan plan_with(const std::string& preset, std::vector<std::string> overrides) {
          {"volume.procedural=sphere", "volume.dims=33", "image.width=32", "image.height=32",
           "transfer_function.points=[[0,0.2,0.4,1,0],[4095,1,0.5,0.1,0.4]]", "sampling.termination=0"})
         overrides.push_back(common);
+    overrides.insert(overrides.begin(), "classification.method=pc");
     overrides.push_back("precision.preset=" + preset);
     const Scene scene = scene_with(built_in_scene(), overrides);
     return make_plan(scene, std::make_shared<Volume>(load_volume(volume_source(scene))));

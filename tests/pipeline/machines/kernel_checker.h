@@ -44,7 +44,8 @@ struct KernelCheck {
 };
 
 inline KernelCase kernel_case(const std::string& name, std::vector<std::string> settings, bool in_cells) {
-    for (const char* common : {"volume.dims=[26, 23, 21]", "image.width=24", "image.height=24"})
+    for (const char* common :
+         {"classification.method=pc", "volume.dims=[26, 23, 21]", "image.width=24", "image.height=24"})
         settings.insert(settings.begin(), common);
     const Scene scene = scene_with(built_in_scene(), settings);
     const auto volume = std::make_shared<const Volume>(load_volume(volume_source(scene)));

@@ -12,7 +12,8 @@ namespace squint {
 namespace {
 
 /// A picture of a volume loaded for it alone, so that no other's cells are kept for it.
-Rendering rendered(const std::vector<std::string>& overrides, const RenderOptions& options) {
+Rendering rendered(std::vector<std::string> overrides, const RenderOptions& options) {
+    overrides.insert(overrides.begin(), "classification.method=pc");
     const Scene scene = scene_with(built_in_scene(), overrides);
     return render(make_plan(scene, std::make_shared<Volume>(load_volume(volume_source(scene)))), options);
 }

@@ -66,9 +66,9 @@ std::shared_ptr<const Volume> fresh(const Volume& volume) {
 TEST(SameBits, ADozenScenesHaveTheModelsBitsByEveryCombinationOfTheWaysToDrawThem) {
     int pictures = 0, failures = 0;
     for (const NamedScene& named : dozen()) {
-        std::vector<std::string> settings{"volume.dims=[26, 23, 21]", "camera.height=28",
-                                          "image.width=24",           "image.height=24",
-                                          "output.fixed=true",        "output.samples=true"};
+        std::vector<std::string> settings{
+            "volume.dims=[26, 23, 21]", "camera.height=28",    "image.width=24",          "image.height=24",
+            "output.fixed=true",        "output.samples=true", "classification.method=pc"};
         settings.insert(settings.end(), named.settings.begin(), named.settings.end());
         const Scene scene = scene_with(built_in_scene(), settings);
         Plan plan = make_plan(scene, std::make_shared<const Volume>(load_volume(volume_source(scene))));

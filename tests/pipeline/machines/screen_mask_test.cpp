@@ -23,6 +23,7 @@ const std::vector<std::string> kSmall{
     "[4095, 0.2, 0.4, 1, 0.2]]"};
 
 Plan plan_of(std::vector<std::string> settings, const std::vector<std::string>& more) {
+    settings.insert(settings.begin(), "classification.method=pc");
     settings.insert(settings.end(), more.begin(), more.end());
     const Scene scene = scene_with(built_in_scene(), settings);
     return make_plan(scene, std::make_shared<const Volume>(load_volume(volume_source(scene))));

@@ -18,6 +18,7 @@ using Word = std::int64_t;
 
 Plan plan_of(int bits, int entries, const std::string& sample, const std::string& input) {
     Scene scene = built_in_scene();
+    scene.classification.method = Method::pc;
     scene.transfer_function = {};
     scene.transfer_function.points = {{0, 1, 1, 1, 0.5}};
     scene.transfer_function.unit_distance = 1;
