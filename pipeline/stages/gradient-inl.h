@@ -48,12 +48,24 @@ HWY_INLINE W lerped_difference(const GradientStage& s, const N& n, int y, int z,
     return lerp(at(1), at(2), weight, s.weight_bits, s.to_first);
 }
 
-/// Interpolates the differences at the cell's eight voxels like a sample.
+/// The 4x4x4 voxels around a cell, with the cell's corners in the middle; x fastest.  Clamped at the volume's
+/// faces.
+template <class W>
+struct Neighbourhood {
+    std::array<W, 64> voxel;
+    const W& at(int x, int y, int z) const { return voxel[static_cast<std::size_t>((z * 4 + y) * 4 + x)]; }
+    /// lerped_difference, or what gives the same from the way voxels are kept.
+    W along_x(const GradientStage& s, int y, int z, int axis, W weight) const {
+        return lerped_difference(s, *this, y, z, axis, weight);
+    }
+};
+
+/// Interpolates the differences at the cell's eight voxels like a sample.  N: a Neighbourhood, however its voxels
+/// are kept.
 template <class W, class N>
 HWY_INLINE W interpolated_difference(const GradientStage& s, const N& n, const std::array<W, 3>& weight,
                                      int axis) {
-    const auto along_x = [&](int y, int z)
-                             SQUINT_WRITTEN_OUT { return lerped_difference(s, n, y, z, axis, weight[0]); };
+    const auto along_x = [&](int y, int z) SQUINT_WRITTEN_OUT { return n.along_x(s, y, z, axis, weight[0]); };
     const W z0 = lerp(along_x(1, 1), along_x(2, 1), weight[1], s.weight_bits, s.to_second);
     const W z1 = lerp(along_x(1, 2), along_x(2, 2), weight[1], s.weight_bits, s.to_second);
     return lerp(z0, z1, weight[2], s.weight_bits, s.to_gradient);

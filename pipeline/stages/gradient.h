@@ -68,12 +68,4 @@ inline void fade_in_up_to(GradientStage& s, double length) {
                                      : s.floor_raw << s.floor_bits << kNormalGuard;
 }
 
-/// The 4x4x4 voxels around a cell, with the cell's corners in the middle; x fastest.  Clamped at the volume's
-/// faces.
-template <class W>
-struct Neighbourhood {
-    std::array<W, 64> voxel;
-    const W& at(int x, int y, int z) const { return voxel[static_cast<std::size_t>((z * 4 + y) * 4 + x)]; }
-};
-
 }  // namespace squint

@@ -46,11 +46,16 @@ HWY_INLINE W exact_location(const LocationStage& s, const RayWords<W>& ray, W k,
     const W start = shift_left(ray.first[a], s.common_fraction - s.location_fraction);
     return affine(start, k, stride(s, ray, axis), s.low[a], s.high[a]);
 }
+/// Of a sample that lies inside the box and is not the ray's last.
+template <class W>
+HWY_INLINE W rounded_inside(const LocationStage& s, W exact) {
+    return quantise(exact, s.to_location);
+}
 /// Sample k's location: quantised once, then clamped to the box, so that it never wraps.
 template <class W>
 HWY_INLINE W rounded_location(const LocationStage& s, const RayWords<W>& ray, W exact, W k, int axis) {
     const auto a = static_cast<std::size_t>(axis);
-    const W here = select(k == ray.last_index, ray.last[a], quantise(exact, s.to_location));
+    const W here = select(k == ray.last_index, ray.last[a], rounded_inside(s, exact));
     return clamp(here, constant<W>(0), constant<W>(s.limit[a]));
 }
 template <class W>
@@ -66,6 +71,16 @@ HWY_INLINE W beside(const LocationStage& s, W location, int axis, bool ahead) {
     return ahead ? min(location, limit - voxel) + voxel : max(location, voxel) - voxel;
 }
 
+/// The cell around a location before the last voxel centre, and the weights of its upper corners.
+template <class W>
+HWY_INLINE CellPosition<W> cell_position_inside(const LocationStage& s, const std::array<W, 3>& location) {
+    CellPosition<W> position;
+    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+        position.cell[a] = floor_shift(location[a], s.location_fraction);
+        position.weight[a] = quantise(fraction_bits(location[a], s.location_fraction), s.to_weight);
+    });
+    return position;
+}
 /// The cell around a location, and the weights of its upper corners; at the far face the last cell, with a
 /// weight of one.
 template <class W>

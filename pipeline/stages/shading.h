@@ -39,7 +39,8 @@ struct GoochTones {
     Rescale to_faded, to_side;
 };
 
-struct ShadingStage {
+/// All of the stage but its table: what kernels copy, so that nothing they store can change it.
+struct ShadingConstants {
     ShadingModel model = ShadingModel::none;
     PowerRule power = PowerRule::squaring;
     int lights = 0;
@@ -61,7 +62,6 @@ struct ShadingStage {
     double exponent = 1;
     int squarings = 0;
     std::int64_t parabola_slope = 0;  // 2 times (exponent + 1) / 2: keeps the lobe's energy; one fraction bit
-    Table power_table;                // power rule `table`: 2^b + 1 rows over the dot's range
     int power_table_bits = 0;
     GoochTones gooch;
     Rescale to_light_view;  // Phong: L.V
@@ -69,6 +69,10 @@ struct ShadingStage {
         to_specular_sum, to_faded, to_diffuse, to_specular, to_lit;
     Rescale to_light;  // per-ray half and view vectors on their way to words
     Spec light_spec;
+};
+
+struct ShadingStage : ShadingConstants {
+    Table power_table;  // power rule `table`: 2^b + 1 rows over the dot's range
 
     template <class V>
     void visit(V&& v) {

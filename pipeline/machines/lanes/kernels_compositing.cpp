@@ -9,43 +9,22 @@
 #include "fixedpoint/words/lane_quotients-inl.h"
 #include "fixedpoint/words/lanes-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
-#include "pipeline/machines/lanes/plain.h"
 #include "pipeline/stages/compositing-inl.h"
+#include "pipeline/stages/default_facts.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 namespace {
 
-/// The default's compositing: form w, straight colours, sums that no limit meets.  A transparent slab is the
-/// identity.
-bool is_plain(const CompositingStage& s) {
-    return s.form == CompositingForm::w && !s.premultiplied &&
-           s.contribution_fraction == s.transparency_fraction && lanes::drops_bits(s.to_contribution) &&
-           lanes::drops_bits(s.to_color) && lanes::does_nothing(s.to_color_sum) &&
-           lanes::does_nothing(s.to_transparency);
-}
-/// Its products are those of numbers from 0 to 1 of 15 bits.
-bool is_of_units(const CompositingStage& s) {
-    const auto drops_15 = [](const Rescale& to) { return to.shift == 15 && to.to_even == 1; };
-    return is_plain(s) && s.of_units && s.alpha_fraction == 15 && s.color_fraction == 15 &&
-           s.transparency_fraction == 15 && drops_15(s.to_contribution) && drops_15(s.to_color);
-}
-/// Says so to the compiler.
-HWY_INLINE void take_as_plain(CompositingStage& s) {
-    s.form = CompositingForm::w, s.premultiplied = false;
-    s.contribution_fraction = s.transparency_fraction;
-    lanes::take_as_dropping_bits(s.to_contribution), lanes::take_as_dropping_bits(s.to_color);
-    lanes::take_as_doing_nothing(s.to_color_sum), lanes::take_as_doing_nothing(s.to_transparency);
-}
-
-template <class L, bool kPlain, bool kKeepsT>
+/// F: what is known of the stage.  kKeepsT: T at the slabs' ends is asked for.
+template <class L, class F, bool kKeepsT>
 void composite_rows(const Plan& plan, const lanes::RayPacket& packet, int steps,
                     const lanes::Samples& samples, lanes::PixelPacket& pixels, lanes::Batch& between) {
     CompositingStage stage = plan.compositing;
-    if constexpr (kPlain) take_as_plain(stage);
+    F::assume(stage);
     const bool backwards = stage.form == CompositingForm::back_to_front;
     // A slab without opacity changes nothing: of rays that have ended, and of rows in which nothing is seen.
-    const bool transparent_is_identity = kPlain || (plan.skips_empty_space && !stage.premultiplied);
+    const bool transparent_is_identity = !F::kNone || (plan.skips_empty_space && !stage.premultiplied);
     const L one = constant<L>(1), zero = constant<L>(0);
     for (int r = 0; r < lanes::kRays; r += static_cast<int>(L::count())) {
         Accumulated<L> pixel{
@@ -90,11 +69,11 @@ void composite_rows(const Plan& plan, const lanes::RayPacket& packet, int steps,
 }
 
 /// Transparency alone, front to back: it does not wait for colours.
-template <class L, bool kPlain>
+template <class L, class F>
 void hide_rows(const Plan& plan, const lanes::RayPacket& packet, const lanes::PixelPacket& pixels, int steps,
                lanes::Samples& samples) {
     CompositingStage stage = plan.compositing;
-    if constexpr (kPlain) take_as_plain(stage);
+    F::assume(stage);
     const L zero = constant<L>(0);
     for (int r = 0; r < lanes::kRays; r += static_cast<int>(L::count())) {
         L transparency = load<L>(pixels.transparency.v + r), remainder = load<L>(pixels.remainder.v + r);
@@ -150,17 +129,21 @@ void store_colors(const Plan& plan, const lanes::PixelPacket& pixels, const lane
 }  // namespace
 
 void compositing_kernel_of(const Plan& plan, const lanes::StageWay& way, lanes::StageKernels& kernels) {
+    const CompositingStage& stage = plan.compositing;
+    const bool keeps_t = plan.scene.output.depth;
+    const auto choose = [&]<class L, class F>() {
+        kernels.hide = &hide_rows<L, F>;
+        if (!keeps_t) kernels.composite = &composite_rows<L, F, false>;
+    };
     lanes::with_word<Lanes, KnownRescales::halves_to_even>(way, [&]<class L>() {
-        kernels.hide = is_plain(plan.compositing) ? &hide_rows<L, true> : &hide_rows<L, false>;
-        kernels.composite = plan.scene.output.depth      ? &composite_rows<L, false, true>
-                            : is_plain(plan.compositing) ? &composite_rows<L, true, false>
-                                                         : &composite_rows<L, false, false>;
+        if (keeps_t) kernels.composite = &composite_rows<L, NoFacts<CompositingStage>, true>;
+        if (DefaultCompositing::hold(stage))
+            choose.template operator()<L, DefaultCompositing>();
+        else
+            choose.template operator()<L, NoFacts<CompositingStage>>();
     });
-    if (way.bits == 32 && !way.is_float && is_of_units(plan.compositing)) {
-        using L = Lanes<std::int32_t, KnownRescales::unit_products>;
-        kernels.hide = &hide_rows<L, true>;
-        if (!plan.scene.output.depth) kernels.composite = &composite_rows<L, true, false>;
-    }
+    if (way.bits == 32 && !way.is_float && UnitCompositing::hold(stage))
+        choose.template operator()<Lanes<std::int32_t, KnownRescales::unit_products>, UnitCompositing>();
     kernels.store_colors = &store_colors;
 }
 

@@ -18,17 +18,6 @@ namespace {
 
 using lanes::kRays;
 
-/// cell_position of locations before the last voxel centre.
-template <class L>
-HWY_INLINE CellPosition<L> cell_position_inside(const LocationStage& s, const std::array<L, 3>& location) {
-    CellPosition<L> position;
-    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
-        position.cell[a] = floor_shift(location[a], s.location_fraction);
-        position.weight[a] = quantise(fraction_bits(location[a], s.location_fraction), s.to_weight);
-    });
-    return position;
-}
-
 template <class L, bool kKeepsLocation>
 void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int to, lanes::Samples& out) {
     const LocationStage stage = plan.location;  // a copy: nothing stored can change it
@@ -48,29 +37,31 @@ void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int
         });
         const L last_length = load<L>(packet.last_length.v + r);
         const L slabs = load_whole<L>(packet.slabs.v + r), last_slab = slabs - constant<L>(1);
+        const auto keep = [&](int at, const CellPosition<L>& position, L length) SQUINT_WRITTEN_OUT {
+            for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+                store_whole(position.cell[a], out.cell[a].v + at);
+                store(position.weight[a], out.weight[a].v + at);
+                if constexpr (kKeepsLocation) store(location[a], out.location[a].v + at);
+            });
+            store(length, out.length.v + at);
+        };
         if constexpr (!RealWord<L>) {
             // A batch that ends before any ray's last slab, its two ends inside the box: nothing is clamped.
             const L rows = constant<L>(to - from - 1);
             auto leaves = (constant<L>(0) < slabs) & !(constant<L>(out.first + to - 1) < last_slab);
             for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
-                const L begin = quantise(exact[a], stage.to_location),
-                        end = quantise(exact[a] + rows * strides[a], stage.to_location);
+                const L begin = rounded_inside(stage, exact[a]),
+                        end = rounded_inside(stage, exact[a] + rows * strides[a]);
                 leaves = leaves | (min(begin, end) < constant<L>(0)) |
                          !(max(begin, end) < constant<L>(stage.limit[a]));
             });
             if (!any(leaves)) {
                 for (int at = from * kRays + r; at < to * kRays; at += kRays) {
                     for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
-                        location[a] = quantise(exact[a], stage.to_location);
+                        location[a] = rounded_inside(stage, exact[a]);
                         exact[a] = exact[a] + strides[a];
                     });
-                    const CellPosition<L> position = cell_position_inside(stage, location);
-                    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
-                        store_whole(position.cell[a], out.cell[a].v + at);
-                        store(position.weight[a], out.weight[a].v + at);
-                        if constexpr (kKeepsLocation) store(location[a], out.location[a].v + at);
-                    });
-                    store(full, out.length.v + at);
+                    keep(at, cell_position_inside(stage, location), full);
                 }
                 continue;
             }
@@ -83,13 +74,7 @@ void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int
                 location[a] = rounded_location(stage, ray, exact[a], k, static_cast<int>(a));
                 if constexpr (!RealWord<L>) exact[a] = exact[a] + strides[a];
             });
-            const CellPosition<L> position = cell_position(stage, location);
-            for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
-                store_whole(position.cell[a], out.cell[a].v + at);
-                store(position.weight[a], out.weight[a].v + at);
-                if constexpr (kKeepsLocation) store(location[a], out.location[a].v + at);
-            });
-            store(select(k == last_slab, last_length, full), out.length.v + at);
+            keep(at, cell_position(stage, location), select(k == last_slab, last_length, full));
         }
     }
 }

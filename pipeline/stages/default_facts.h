@@ -1,0 +1,48 @@
+// What the default's formats make true of each stage: the facts that kernels of their own are compiled for.
+#pragma once
+
+#include "pipeline/stages/compositing.h"
+#include "pipeline/stages/facts.h"
+#include "pipeline/stages/gradient.h"
+#include "pipeline/stages/shading.h"
+
+namespace squint {
+
+/// Voxels' gradient by central differences.
+using DefaultGradient =
+    Facts<GradientStage, Is<&GradientStage::rule, GradientRule::central>, Is<&GradientStage::fades, false>,
+          AtMost<&GradientStage::weight_bits, 14>, Rounds<&GradientStage::to_normal, Rounding::rnd_conv>,
+          DropsBits<&GradientStage::to_first>, DropsBits<&GradientStage::to_second>,
+          DropsBits<&GradientStage::to_gradient>,
+          DropsBitsUnless<&GradientStage::to_scaled, &GradientStage::isotropic>>;
+
+/// A white light on one side of things, orthographic Blinn-Phong by squarings of straight colours; sums that
+/// no limit meets but the clamps that follow.
+using DefaultShading = Facts<ShadingStage, Is<&ShadingStage::model, ShadingModel::blinn_phong>,
+                             Is<&ShadingStage::power, PowerRule::squaring>, Is<&ShadingStage::lights, 1>,
+                             Is<&ShadingStage::white, true>, Is<&ShadingStage::two_sided, false>,
+                             Is<&ShadingStage::fades, false>, Is<&ShadingStage::half_per_ray, false>,
+                             Is<&ShadingStage::premultiplied, false>,
+                             DropsBitsBeforeClamp<&ShadingStage::to_dot, &ShadingStage::dot_fraction>,
+                             DoesNothing<&ShadingStage::to_power_input>, DropsBits<&ShadingStage::to_power>,
+                             DropsBits<&ShadingStage::to_diffuse_sum>,
+                             DropsBits<&ShadingStage::to_specular_sum>, DropsBits<&ShadingStage::to_diffuse>,
+                             DropsBits<&ShadingStage::to_specular>, DropsBits<&ShadingStage::to_lit>>;
+
+/// Form w, straight colours, sums that no limit meets.  A transparent slab is the identity.
+using DefaultCompositing =
+    Facts<CompositingStage, Is<&CompositingStage::form, CompositingForm::w>,
+          Is<&CompositingStage::premultiplied, false>,
+          Same<&CompositingStage::contribution_fraction, &CompositingStage::transparency_fraction>,
+          DropsBits<&CompositingStage::to_contribution>, DropsBits<&CompositingStage::to_color>,
+          DoesNothing<&CompositingStage::to_color_sum>, DoesNothing<&CompositingStage::to_transparency>>;
+
+/// ... and products of numbers from 0 to 1 of 15 bits, rounded halves to even.
+using UnitCompositing = DefaultCompositing::And<
+    Is<&CompositingStage::of_units, true>, Is<&CompositingStage::alpha_fraction, 15>,
+    Is<&CompositingStage::color_fraction, 15>, Is<&CompositingStage::transparency_fraction, 15>,
+    DropsBits<&CompositingStage::to_contribution, 15>, DropsBits<&CompositingStage::to_color, 15>,
+    Rounds<&CompositingStage::to_contribution, Rounding::rnd_conv>,
+    Rounds<&CompositingStage::to_color, Rounding::rnd_conv>>;
+
+}  // namespace squint
