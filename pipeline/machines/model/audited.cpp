@@ -1,0 +1,8 @@
+#include "pipeline/machines/model/rays_of.h"
+
+namespace squint::model {
+
+template void cast_tile<Audited>(const Plan&, int, int, int, int, Image&, TileStatistics&);
+template void cast_traced<Audited>(const Plan&, std::vector<TraceEvent>&, RayTrace&);
+
+}  // namespace squint::model
