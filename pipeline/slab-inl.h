@@ -3,7 +3,7 @@
 //     volume -> location -> interpolation -> gradient -> classification -> shading -> compositing -> pixel
 //
 // A template over the word, the classification, the source of voxels and an observer.  A machine runs it:
-// the golden model, its audit and traces (machines/model.cpp), intervals (plan/ranges.cpp), the tally of
+// the golden model, its audit and traces (machines/model/), intervals (plan/ranges.cpp), the tally of
 // hardware (studies).  A branch on a comparison asks any(): intervals take both ways.  Compiled once per
 // SIMD target.
 #if defined(SQUINT_PIPELINE_SLAB_INL_H) == defined(HWY_TARGET_TOGGLE)
@@ -18,15 +18,16 @@
 #include "pipeline/classification/methods-inl.h"
 #include "pipeline/plan/plan.h"
 #include "pipeline/stages/compositing-inl.h"
+#include "pipeline/stages/faces.h"
 #include "pipeline/stages/gradient-inl.h"
 #include "pipeline/stages/inside-inl.h"
 #include "pipeline/stages/interpolation-inl.h"
 #include "pipeline/stages/location-inl.h"
+#include "pipeline/stages/projection-inl.h"
 #include "pipeline/stages/shading-inl.h"
 
 #include <hwy/highway.h>
 
-#include <algorithm>
 #include <array>
 
 HWY_BEFORE_NAMESPACE();
@@ -42,33 +43,22 @@ struct FromVolume {
         const Index3 p(to_index(at[0]), to_index(at[1]), to_index(at[2]));
         Cell<W> corners;
         for (int i = 0; i < 8; ++i)
-            corners.corner[static_cast<std::size_t>(i)] = constant<W>(volume.at(
-                std::min(p.x + (i & 1), volume.dims.x - 1), std::min(p.y + (i >> 1 & 1), volume.dims.y - 1),
-                std::min(p.z + (i >> 2), volume.dims.z - 1)));
+            corners.corner[static_cast<std::size_t>(i)] = constant<W>(
+                volume.at(voxel_at(p.x + (i & 1), volume.dims.x), voxel_at(p.y + (i >> 1 & 1), volume.dims.y),
+                          voxel_at(p.z + (i >> 2), volume.dims.z)));
         return corners;
     }
     template <class W>
     Neighbourhood<W> neighbourhood(const std::array<W, 3>& at) const {
         const Index3 p(to_index(at[0]), to_index(at[1]), to_index(at[2]));
-        const auto inside = [](std::int64_t i, std::int64_t n) {
-            return std::clamp<std::int64_t>(i, 0, n - 1);
-        };
         Neighbourhood<W> n;
         for (int i = 0; i < 64; ++i)
             n.voxel[static_cast<std::size_t>(i)] = constant<W>(volume.at(
-                inside(p.x + (i & 3) - 1, volume.dims.x), inside(p.y + (i >> 2 & 3) - 1, volume.dims.y),
-                inside(p.z + (i >> 4) - 1, volume.dims.z)));
+                voxel_at(p.x + (i & 3) - 1, volume.dims.x), voxel_at(p.y + (i >> 2 & 3) - 1, volume.dims.y),
+                voxel_at(p.z + (i >> 4) - 1, volume.dims.z)));
         return n;
     }
 };
-
-/// MIP, MinIP, average: adds the two ends of a slab to what the ray has met.
-template <class W>
-HWY_INLINE W merge_samples(CompositingMode mode, W kept, W next) {
-    return mode == CompositingMode::mip     ? max(kept, next)
-           : mode == CompositingMode::minip ? min(kept, next)
-                                            : kept + next;
-}
 
 /// The mean along a ray (trapezoid rule), rounded once: each slab counts its ends' mean, by its length.
 template <class W>

@@ -148,14 +148,9 @@ HWY_INLINE std::array<std::array<Lanes<float, K>, 4>, 2> load_two_rows(const flo
     return load_two_rows(rows, row, lanes_detail::to_integers(row));
 }
 template <KnownRescales K>
-HWY_INLINE std::array<Lanes<float, K>, 4> lerp_rows(const Table& table, Lanes<float, K> row,
-                                                    Lanes<float, K> weight, int weight_bits,
-                                                    const Rescale& to_color, const Rescale& to_alpha) {
-    const auto rows = load_two_rows(table.floats(), row);
-    const auto between = [&](std::size_t c) {
-        return quantise(blend(rows[0][c], rows[1][c], weight, weight_bits), c < 3 ? to_color : to_alpha);
-    };
-    return {between(0), between(1), between(2), between(3)};
+HWY_INLINE std::array<std::array<Lanes<float, K>, 4>, 2> load_two_rows(const Table& table,
+                                                                       Lanes<float, K> row) {
+    return load_two_rows(table.floats(), row);
 }
 template <KnownRescales K>
 HWY_INLINE std::array<std::array<Lanes<float, K>, 4>, 2> gather_two_cells(const CellTable& table,

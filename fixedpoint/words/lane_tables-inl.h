@@ -171,7 +171,8 @@ HWY_INLINE std::array<std::array<Lanes<std::int32_t, K>, 4>, 2> load_two_rows(co
     const auto b = load_quads([&](int lane) { return rows + std::int64_t{4} * at[lane] + 4; });
     return {{{L{a[0]}, L{a[1]}, L{a[2]}, L{a[3]}}, {L{b[0]}, L{b[1]}, L{b[2]}, L{b[3]}}}};
 }
-/// lerp_rows for paired rows (Table::paired) and weights of at most 14 bits.
+/// Interpolates between rows `row` and `row + 1` of four columns: paired rows (Table::paired), weights of at
+/// most 14 bits.
 template <KnownRescales K>
 HWY_INLINE std::array<Lanes<std::int32_t, K>, 4> lerp_paired_rows(const std::int32_t* paired,
                                                                   Lanes<std::int32_t, K> row,
@@ -190,22 +191,6 @@ HWY_INLINE std::array<Lanes<std::int32_t, K>, 4> lerp_paired_rows(const std::int
             blend_pairs<K>(pairs[2], weights, offset, to_color),
             blend_pairs<K>(pairs[3], weights, offset, to_alpha)};
 }
-template <class T, KnownRescales K>
-HWY_INLINE std::array<Lanes<T, K>, 4> lerp_rows(const Table& table, Lanes<T, K> row, Lanes<T, K> weight,
-                                                int weight_bits, const Rescale& to_color,
-                                                const Rescale& to_alpha) {
-    using L = Lanes<T, K>;
-    if constexpr (sizeof(T) == 4)
-        if (const std::int32_t* paired = table.paired(); paired && weight_bits <= 14)
-            return lerp_paired_rows(paired, row, weight, weight_bits, to_color, to_alpha);
-    const L next = row + make_word(WordTag<L>{}, 1);
-    const auto between = [&](int c) {
-        return quantise(blend(gather(table, row, c), gather(table, next, c), weight, weight_bits),
-                        c < 3 ? to_color : to_alpha);
-    };
-    return {between(0), between(1), between(2), between(3)};
-}
-
 /// A node of four 16-bit words is two 32-bit words, or one of 64 bits; the first channel is lowest.
 template <KnownRescales K>
 HWY_INLINE std::array<Lanes<std::int32_t, K>, 4> gather_cell(const CellTable& table,

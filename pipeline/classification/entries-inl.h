@@ -13,6 +13,7 @@
 
 #include <hwy/highway.h>
 
+#include <concepts>
 #include <type_traits>
 
 HWY_BEFORE_NAMESPACE();
@@ -99,16 +100,37 @@ HWY_INLINE auto is_opaque(const EntryLookup& e, const EntryPosition<W>& at) {
            ((at.fraction == one) & (zero < next_bit));
 }
 
+/// Words that blend two packed numbers in one operation: what lerp_rows gives, of rows that are
+/// Table::paired and weights of 14 bits at most.
+template <class W>
+concept BlendsPairs = requires(const std::int32_t* paired, W word, const Rescale& to) {
+    { lerp_paired_rows(paired, word, word, 14, to, to) } -> std::same_as<std::array<W, 4>>;
+};
+/// Words that load two rows of a table at once.
+template <class W>
+concept LoadsRows = requires(const Table& table, W word) {
+    { load_two_rows(table, word) } -> std::same_as<std::array<std::array<W, 4>, 2>>;
+};
 /// Interpolates between rows `row` and `row + 1` of a table with four columns: red, green, blue, alpha.
 template <class W>
 HWY_INLINE std::array<W, 4> lerp_rows(const Table& table, W row, W weight, int weight_bits,
                                       const Rescale& to_color, const Rescale& to_alpha) {
-    std::array<W, 4> between;
-    for (int c = 0; c < 4; ++c)
-        between[static_cast<std::size_t>(c)] = quantise(
-            blend(gather(table, row, c), gather(table, row + constant<W>(1), c), weight, weight_bits),
-            c < 3 ? to_color : to_alpha);
-    return between;
+    if constexpr (BlendsPairs<W>)
+        if (const std::int32_t* paired = table.paired(); paired && weight_bits <= 14)
+            return lerp_paired_rows(paired, row, weight, weight_bits, to_color, to_alpha);
+    const auto between = [&](W near, W far, const Rescale& to)
+                             SQUINT_WRITTEN_OUT { return lerp(near, far, weight, weight_bits, to); };
+    if constexpr (LoadsRows<W>) {
+        const auto rows = load_two_rows(table, row);
+        return {between(rows[0][0], rows[1][0], to_color), between(rows[0][1], rows[1][1], to_color),
+                between(rows[0][2], rows[1][2], to_color), between(rows[0][3], rows[1][3], to_alpha)};
+    } else {
+        const W next = row + constant<W>(1);
+        const auto column = [&](int c, const Rescale& to) SQUINT_WRITTEN_OUT {
+            return between(gather(table, row, c), gather(table, next, c), to);
+        };
+        return {column(0, to_color), column(1, to_color), column(2, to_color), column(3, to_alpha)};
+    }
 }
 
 /// The depth of a full step times the length of a slab, exact, then rounded once.
@@ -127,17 +149,12 @@ HWY_INLINE W point_depth(const EntryLookup& e, const EntryPosition<W>& at, W len
     return shortened(full, length, e.length_fraction, e.to_shorter);
 }
 
-/// Classifies one point for a slab of `length` steps: post-classification, and every method where both ends
-/// are equal.
+/// Finishes a point's slab of `length` steps from what stands `between` its two rows: a shorter slab has another
+/// opacity, and an opaque place ends the ray.
 template <class W>
-HWY_INLINE Slab<W> classify_point(const EntryLookup& e, W input, W length) {
-    const EntryPosition<W> row = sub_entry_position(e, e.row_bits, input);
+HWY_INLINE Slab<W> finish_point(const EntryLookup& e, W input, const std::array<W, 4>& between, W length) {
     const W full = constant<W>(std::int64_t{1} << e.length_fraction);
-    Slab<W> slab;
-    const std::array<W, 4> between =
-        lerp_rows(e.table, row.entry, row.fraction, e.input_fraction - e.row_bits, e.to_color, e.to_alpha);
-    slab.color = {between[0], between[1], between[2]};
-    slab.alpha = between[EntryLookup::alpha];
+    Slab<W> slab{{between[0], between[1], between[2]}, between[EntryLookup::alpha]};
     const bool may_be_opaque = e.has_opaque && any(!(slab.alpha < constant<W>(e.least_opaque)));
     const auto shorter = length < full;
     if (any(shorter)) {
@@ -155,6 +172,17 @@ HWY_INLINE Slab<W> classify_point(const EntryLookup& e, W input, W length) {
         }
     }
     return slab;
+}
+
+/// Classifies one point for a slab of `length` steps: post-classification, and every method where both ends
+/// are equal).
+template <class W>
+HWY_INLINE Slab<W> classify_point(const EntryLookup& e, W input, W length) {
+    const EntryPosition<W> row = sub_entry_position(e, e.row_bits, input);
+    return finish_point(
+        e, input,
+        lerp_rows(e.table, row.entry, row.fraction, e.input_fraction - e.row_bits, e.to_color, e.to_alpha),
+        length);
 }
 
 }  // namespace squint::HWY_NAMESPACE

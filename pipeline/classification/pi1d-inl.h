@@ -26,14 +26,7 @@ HWY_INLINE Slab<W> classify_means(const PreIntegrated1D& m, const CutSlab<W>& cu
                                                  mean_of(PreIntegrated1D::value, m.to_depth));
     const W limit = largest_color(m.premultiplied, slab.alpha);
     for (int c = 0; c < 3; ++c) slab.color[static_cast<std::size_t>(c)] = min(mean_of(c, m.to_color), limit);
-    const auto shorter = is_shorter(m.prefix.entries, length);
-    if (any(shorter)) {
-        const W depth = slab_depth(m.prefix, cut, length);
-        const Slab<W> part =
-            with_alpha(m.premultiplied, slab, opacity_of_depth(m.prefix.entries.opacity, depth));
-        for (std::size_t c = 0; c < 3; ++c) slab.color[c] = select(shorter, part.color[c], slab.color[c]);
-        slab.alpha = select(shorter, part.alpha, slab.alpha);
-    }
+    take_own_depth(m.prefix, m.premultiplied, cut, length, is_shorter(m.prefix.entries, length), slab);
     return finish_premultiplied(m.prefix, m.premultiplied, cut, front, length, slab);
 }
 /// Without rounding: means of values that are linear between entries.

@@ -56,13 +56,7 @@ HWY_INLINE Slab<W> classify(const PreIntegrated2D& m, W front, W back, W length)
     const CutSlab<W> cut = cut_at_wall(m.prefix, front, back);
     Slab<W> slab = look_up(m, front, cut.end_input);
     const auto other = is_shorter(m.prefix.entries, length) | (constant<W>(0) < cut.wall);
-    if (any(other)) {
-        const W depth = slab_depth(m.prefix, cut, length);
-        const Slab<W> part =
-            with_alpha(m.premultiplied, slab, opacity_of_depth(m.prefix.entries.opacity, depth));
-        for (std::size_t c = 0; c < 3; ++c) slab.color[c] = select(other, part.color[c], slab.color[c]);
-        slab.alpha = select(other, part.alpha, slab.alpha);
-    }
+    take_own_depth(m.prefix, m.premultiplied, cut, length, other, slab);
     return finish_premultiplied(m.prefix, m.premultiplied, cut, front, length, slab);
 }
 

@@ -227,6 +227,16 @@ HWY_INLINE Slab<W> with_alpha(const PremultipliedRules& r, Slab<W> part, W alpha
     part.alpha = alpha;
     return part;
 }
+/// A premultiplied part whose opacity is that of its own depth where `other` than a full, whole slab's.
+template <class W, class Mask>
+HWY_INLINE void take_own_depth(const PrefixLookup& p, const PremultipliedRules& r, const CutSlab<W>& cut,
+                               W length, const Mask& other, Slab<W>& part) {
+    if (!any(other)) return;
+    const W depth = slab_depth(p, cut, length);
+    const Slab<W> own = with_alpha(r, part, opacity_of_depth(p.entries.opacity, depth));
+    for (std::size_t c = 0; c < 3; ++c) part.color[c] = select(other, own.color[c], part.color[c]);
+    part.alpha = select(other, own.alpha, part.alpha);
+}
 /// finish_straight for a premultiplied part.
 template <class W>
 HWY_INLINE Slab<W> finish_premultiplied(const PrefixLookup& p, const PremultipliedRules& r,

@@ -1,6 +1,7 @@
 #include "pipeline/machines/lanes/cell_blocks.h"
 
 #include "pipeline/machines/lanes/kept.h"
+#include "pipeline/stages/faces.h"
 
 #include <sys/mman.h>
 
@@ -103,16 +104,15 @@ void CellBlocks::fill(std::int64_t index, T* cells) const {
     const Index3 low(index % blocks_.x * kSide, index / blocks_.x % blocks_.y * kSide,
                      index / (blocks_.x * blocks_.y) * kSide);
     const T* voxels = static_cast<const T*>(volume_.data.get());
-    // Beyond the volume its last voxels stand again; no sample has such a cell.
+    // No sample has a cell beyond the volume.
     std::int64_t x[kSide + 1];
-    for (std::int64_t i = 0; i <= kSide; ++i) x[i] = std::min(low.x + i, n.x - 1);
+    for (std::int64_t i = 0; i <= kSide; ++i) x[i] = voxel_at(low.x + i, n.x);
     for (std::int64_t k = 0; k < kSide; ++k)
         for (std::int64_t j = 0; j < kSide; ++j) {
             const T* row[4];  // y fastest
             for (std::int64_t r = 0; r < 4; ++r)
-                row[r] =
-                    voxels +
-                    (std::min(low.z + k + r / 2, n.z - 1) * n.y + std::min(low.y + j + r % 2, n.y - 1)) * n.x;
+                row[r] = voxels +
+                         (voxel_at(low.z + k + r / 2, n.z) * n.y + voxel_at(low.y + j + r % 2, n.y)) * n.x;
             for (std::int64_t i = 0; i < kSide; ++i)
                 for (const T* line : row) *cells++ = line[x[i]], *cells++ = line[x[i + 1]];
         }

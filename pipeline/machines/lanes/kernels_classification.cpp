@@ -12,6 +12,9 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
+static_assert(BlendsPairs<Lanes<std::int32_t>> && LoadsRows<Lanes<float>>,
+              "lerp_rows has lost its fast ways");
+
 /// pips.h's rows by loads of whole ones.
 template <KnownRescales K>
 HWY_INLINE std::array<std::array<Lanes<std::int32_t, K>, 4>, 2> prefix_rows(const PowerSeriesOfOrder1& m,
@@ -101,7 +104,7 @@ void classify_paired_entries(const Plan& plan, int steps, lanes::Samples& sample
             rows, place.entry, place.fraction, spacing.input_fraction - spacing.row_bits, to_color, to_alpha);
         Slab<L> slab{{between[0], between[1], between[2]}, between[EntryLookup::alpha]};
         if (any((length < full) | !(slab.alpha < least_opaque)))
-            slab = classify_point(entries, input, length);
+            slab = finish_point(entries, input, between, length);
         store_slab(slab, at, samples);
     }
 }

@@ -9,6 +9,7 @@
 #include "fixedpoint/words/lane_tables-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/machines/lanes/packing-inl.h"
+#include "pipeline/stages/faces.h"
 
 #include <algorithm>
 #include <bit>
@@ -25,16 +26,6 @@ using lanes::Samples;
 using lanes::VoxelSource;
 using lanes::Word;
 constexpr int kLanes = static_cast<int>(HWY_LANES(Word));
-
-// Offsets in voxels from a cell's lower corner to its four pairs along x.
-struct PairOffsets {
-    std::int64_t pair[4];
-    explicit PairOffsets(const Volume& volume) {
-        const std::int64_t y = volume.dims.y > 1 ? volume.dims.x : 0,
-                           z = volume.dims.z > 1 ? volume.dims.x * volume.dims.y : 0;
-        pair[0] = 0, pair[1] = y, pair[2] = z, pair[3] = y + z;
-    }
-};
 
 // A pair of voxels as two 16-bit words.
 HWY_INLINE Word pair_at(const std::uint16_t* voxels) {
@@ -63,7 +54,7 @@ constexpr int kOutermost[] = {0, kSide - 1, kRays - kSide, kRays - 1};
 template <class T, bool kNumbered>
 void prefetch_linear(const VoxelSource& source, int from, int to, Samples& s) {
     const Volume& volume = *source.volume;
-    const PairOffsets offsets(volume);
+    const PairOffsets offsets(volume.dims);
     const hn::ScalableTag<Word> d;
     if constexpr (kNumbered) {
         const auto row = hn::Set(d, static_cast<Word>(volume.dims.x)),
@@ -84,7 +75,7 @@ void prefetch_linear(const VoxelSource& source, int from, int to, Samples& s) {
 template <class T, bool kNumbered>
 void fetch_linear(const VoxelSource& source, int from, int to, Samples& s) {
     const Volume& volume = *source.volume;
-    const PairOffsets offsets(volume);
+    const PairOffsets offsets(volume.dims);
     const T* const voxels = static_cast<const T*>(volume.data.get());
     for (int i = from * kRays; i < to * kRays; ++i) {
         const T* corner = kNumbered ? voxels + s.place.v[i] : corner_of<T>(volume, s, i);
@@ -122,7 +113,7 @@ void prefetch_cells(const VoxelSource& source, int from, int to, Samples& s) {
 template <class T>
 void fetch_cells(const VoxelSource& source, int from, int to, Samples& s) {
     const hn::ScalableTag<Word> d;
-    const PairOffsets offsets(*source.volume);
+    const PairOffsets offsets(source.volume->dims);
     T spare[kLanes][8];
     const auto spared = [&](int lane, int at) {  // a cell that is not there is put together here
         const T* corner = corner_of<T>(*source.volume, s, at + lane);
@@ -260,9 +251,6 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
     const auto wants_inner = [cross = plan.gradient.rule == GradientRule::central](int row) {
         return cross && lanes::is_outer_row(row % 4, row / 4);
     };
-    const auto clamped = [](std::int64_t i, std::int64_t end) {
-        return std::clamp<std::int64_t>(i, 0, end - 1);
-    };
     for (int at = 0; at < count; at += kLanes) {
         lanes::Batch* pair = lit.pair;
         const auto& cell = lit.cell;
@@ -319,13 +307,12 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
             }
             continue;
         }
-        // Beside the volume's faces its outermost voxels go on.
         for (int i = at; i < at + here; ++i)
             for (int row = 0; row < 16; ++row) {
                 if (!(rows >> row & 1)) continue;
-                const T* line = data + n.x * (clamped(cell[1].v[i] + row % 4 - 1, n.y) +
-                                              n.y * clamped(cell[2].v[i] + row / 4 - 1, n.z));
-                const auto voxel = [&](int x) { return Word{line[clamped(cell[0].v[i] + x - 1, n.x)]}; };
+                const T* line = data + n.x * (voxel_at(cell[1].v[i] + row % 4 - 1, n.y) +
+                                              n.y * voxel_at(cell[2].v[i] + row / 4 - 1, n.z));
+                const auto voxel = [&](int x) { return Word{line[voxel_at(cell[0].v[i] + x - 1, n.x)]}; };
                 const bool inner = wants_inner(row);
                 pair[2 * row].v[i] = inner ? voxel(1) | voxel(2) << 16 : voxel(0) | voxel(1) << 16;
                 pair[2 * row + 1].v[i] = voxel(2) | voxel(3) << 16;
