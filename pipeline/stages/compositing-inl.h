@@ -33,10 +33,15 @@ HWY_INLINE Accumulated<W> nothing_yet(const CompositingStage& s) {
             constant<W>(s.to_contribution.active ? s.first_remainder() : 0)};
 }
 
+/// w = alpha T of form w, rounded.
+template <class W>
+HWY_INLINE W rounded_contribution(const CompositingStage& s, W alpha, W transparency) {
+    return quantised_product(alpha, transparency, s.to_contribution);
+}
 /// w = alpha T, rounded; in w_carry floored, with the remainder of earlier slabs added and the new one kept.
 template <class W>
 HWY_INLINE W contribution(const CompositingStage& s, W alpha, Accumulated<W>& pixel) {
-    if (s.form == CompositingForm::w) return quantised_product(alpha, pixel.transparency, s.to_contribution);
+    if (s.form == CompositingForm::w) return rounded_contribution(s, alpha, pixel.transparency);
     const W sum = alpha * pixel.transparency + pixel.remainder;
     const W w = quantise(sum, s.to_contribution);
     const int shift = std::max(s.to_contribution.shift, 0);
@@ -87,6 +92,20 @@ HWY_INLINE W unit_product(const CompositingStage& s, W x, W y) {
     return x * y / constant<W>(s.unit());
 }
 
+/// Adds a slab of contribution w to a pixel: C + c w (C + c T of a premultiplied colour), T - w.
+template <class W>
+HWY_INLINE void take_contribution(const CompositingStage& s, Accumulated<W>& pixel,
+                                  const std::array<W, 3>& color, W w) {
+    W& t = pixel.transparency;
+    for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
+        const W share = quantised_product(color[c], s.premultiplied ? t : w, s.to_color);
+        pixel.color[c] = quantise(pixel.color[c] + share, s.to_color_sum);
+    });
+    const int finer = std::max(s.contribution_fraction - s.transparency_fraction, 0);
+    const int coarser = std::max(s.transparency_fraction - s.contribution_fraction, 0);
+    t = quantise(shift_left(t, finer) - shift_left(w, coarser), s.to_transparency);
+}
+
 /// Composites one slab onto a pixel.
 template <class W>
 HWY_INLINE void composite(const CompositingStage& s, Accumulated<W>& pixel, std::array<W, 3> color, W alpha) {
@@ -94,14 +113,7 @@ HWY_INLINE void composite(const CompositingStage& s, Accumulated<W>& pixel, std:
     W& t = pixel.transparency;
     if (s.takes_from_transparency()) {
         const W w = contribution(s, alpha, pixel);
-        for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
-            const W share = quantised_product(color[c], s.premultiplied ? t : w, s.to_color);
-            pixel.color[c] = quantise(pixel.color[c] + share, s.to_color_sum);
-        });
-        const int finer = std::max(s.contribution_fraction - s.transparency_fraction, 0);
-        const int coarser = std::max(s.transparency_fraction - s.contribution_fraction, 0);
-        t = quantise(shift_left(t, finer) - shift_left(w, coarser), s.to_transparency);
-        return;
+        return take_contribution(s, pixel, color, w);
     }
     if (s.form == CompositingForm::straight) {
         const W before = one - t;

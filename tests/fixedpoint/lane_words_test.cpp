@@ -8,6 +8,7 @@
 
 #include "fixedpoint/words.h"
 #include "fixedpoint/words/all_lanes-inl.h"
+#include "fixedpoint/words/unit_lanes-inl.h"
 #include "pipeline/classification/entries-inl.h"
 
 #include <bit>
@@ -197,18 +198,55 @@ void compare_wide(Comparison<T>& compare) {
 
 /// Numbers from 0 to 1 of 15 fraction bits, both ends included; half of them of few significant bits, whose
 /// products are often halves.
+template <class Comparison>
+std::int64_t any_unit(Comparison& compare) {
+    constexpr std::int64_t kOne = 1 << 15;
+    if (compare.between(0, 1)) return compare.between(0, kOne);
+    const std::int64_t bits = compare.between(0, 15);
+    return compare.between(0, kOne >> bits) << bits;
+}
+Rescale to_unit() {
+    Rescale to(30, Spec{{1, 15, false}, Rounding::rnd_conv, Overflow::sat});
+    to.limits = false;
+    return to;
+}
 void compare_unit_products(std::vector<std::string>& wrong) {
     Comparison<std::int32_t, KnownRescales::unit_products> compare(wrong);
-    const Rescale to(30, Spec{{1, 15, false}, Rounding::rnd_conv, Overflow::sat});
-    constexpr std::int64_t kOne = 1 << 15;
-    const auto draw = [&](int) {
-        if (compare.between(0, 1)) return compare.between(0, kOne);
-        const std::int64_t bits = compare.between(0, 15);
-        return compare.between(0, kOne >> bits) << bits;
-    };
+    const Rescale to = to_unit();
     for (int round = 0; round < 100'000 && wrong.empty(); ++round)
-        compare("unit product", draw, [&](auto x, auto y, auto) { return quantised_product(x, y, to); });
+        compare(
+            "unit product", [&](int) { return any_unit(compare); },
+            [&](auto x, auto y, auto) { return quantised_product(x, y, to); });
 }
+
+/// Products, sums, order and masks in 16 bits, on their way from words of 32 bits and back.
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_SSE4
+void compare_unit_lanes(std::vector<std::string>& wrong) {
+    using L = Lanes<std::int32_t>;
+    using Parts = UnitParts<L>;
+    Comparison<std::int32_t> draw(wrong);
+    const Rescale to = to_unit();
+    for (int round = 0; round < 100'000 && wrong.empty(); ++round) {
+        std::int32_t a[16], b[16], product[16], clear[16];
+        for (std::int32_t* x : {a, b})
+            for (int i = 0; i < 16; ++i) x[i] = static_cast<std::int32_t>(any_unit(draw));
+        Parts x, y;
+        for (std::size_t i = 0; i < x.size(); ++i)
+            x[i] = load<L>(a + i * L::count()), y[i] = load<L>(b + i * L::count());
+        const UnitLanes p = units_of<L>(x), q = units_of<L>(y);
+        const Parts pq = words_of<L>(quantised_product(p, q, to)),
+                    rest = words_of<L>(only(p < q, constant<UnitLanes>(1 << 15) - p));
+        for (std::size_t i = 0; i < x.size(); ++i)
+            store(pq[i], product + i * L::count()), store(rest[i], clear + i * L::count());
+        for (std::size_t i = 0; i < UnitLanes::count(); ++i)
+            if (product[i] != quantised_product(std::int64_t{a[i]}, std::int64_t{b[i]}, to) ||
+                clear[i] != (a[i] < b[i] ? (1 << 15) - a[i] : 0))
+                wrong.push_back("unit lanes of " + std::to_string(a[i]) + " and " + std::to_string(b[i]));
+    }
+}
+#else
+void compare_unit_lanes(std::vector<std::string>&) {}
+#endif
 
 template <class T>
 void compare_words(std::vector<std::string>& wrong) {
@@ -330,6 +368,7 @@ void compare_all_words(std::vector<std::string>& wrong) {
     compare_words<std::int32_t>(wrong);
     compare_words<std::int64_t>(wrong);
     compare_unit_products(wrong);
+    compare_unit_lanes(wrong);
     compare_float_words(wrong);
 }
 

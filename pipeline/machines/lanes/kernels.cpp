@@ -45,9 +45,10 @@ StageKernels kernels_for(const Plan& plan, const StageWays& ways, const VoxelSou
                          std::int64_t target) {
     StageKernels kernels;
     ray_kernels(target, kernels);
-    sampling_kernels(target, plan, ways, kernels);
+    sampling_kernels(target, plan, ways, source, kernels);
     voxel_kernels(target, source, kernels);
     classification_kernel(target, plan, ways.classification, kernels);
+    point_kernels(target, plan, ways, kernels);
     shading_kernels(target, plan, ways, kernels);
     inside_kernels(target, ways, kernels);
     compositing_kernel(target, plan, ways.compositing, kernels);

@@ -6,8 +6,10 @@
 #include "pipeline/machines/lanes/cell_blocks.h"
 #include "pipeline/machines/lanes/empty_space.h"
 #include "pipeline/machines/lanes/packet.h"
+#include "pipeline/machines/lanes/schedule.h"
 #include "pipeline/plan/plan.h"
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -20,6 +22,8 @@ struct VoxelSource {
     const std::uint8_t* cells = nullptr;  // null: from the volume itself
     Index3 blocks{0, 0, 0};
     std::vector<std::int32_t> slots;  // of each block: its first cell, or -1: from the volume itself
+    // A packet's rays lie so far apart that each asks memory for its own voxels.
+    bool requests_all = false;
 };
 
 struct StageKernels {
@@ -35,10 +39,18 @@ struct StageKernels {
     void (*locate)(const Plan&, const RayPacket&, int from, int to, Samples&) = nullptr;
     /// Rows [from, to): where the voxels lie, and a request to memory for them.
     void (*prefetch)(const VoxelSource&, int from, int to, Samples&) = nullptr;
+    /// Rows [from, to) that have their places: the request alone.
+    void (*request)(const VoxelSource&, int from, int to, const Samples&) = nullptr;
+    /// locate and the places of its cells, without a request.
+    void (*locate_address)(const Plan&, const VoxelSource&, const RayPacket&, int from, int to,
+                           Samples&) = nullptr;
     /// Rows [from, to): corners by pairs.
     void (*fetch)(const VoxelSource&, int from, int to, Samples&) = nullptr;
     /// Rows [from, to): corners to inputs.
     void (*interpolate)(const Plan&, int from, int to, Samples&) = nullptr;
+    /// fetch and interpolate.  Meanwhile rows [next_from, next_to) of the batch to come are requested.
+    void (*fetch_interpolate)(const Plan&, const VoxelSource&, int from, int to, Samples&, int next_from,
+                              int next_to, const Samples& next) = nullptr;
     /// Slabs [0, steps): inputs to colours and opacities.
     void (*classify)(const Plan&, int steps, Samples&) = nullptr;
     /// Front to back: of slabs [0, steps), those behind the end of their ray become transparent, for nobody
@@ -81,11 +93,20 @@ struct StageKernels {
     /// T at the slabs' ends: row s at the front of slab s.
     void (*composite)(const Plan&, const RayPacket&, int steps, const Samples&, PixelPacket&,
                       Batch& between) = nullptr;
+    /// classify and composite, where nothing stands between them.
+    void (*classify_composite)(const Plan&, const RayPacket&, int steps, const Samples&,
+                               PixelPacket&) = nullptr;
     /// R G B A of a packet's pixels into an image.
     void (*store_colors)(const Plan&, const PixelPacket&, const PacketPlace&, Image&) = nullptr;
     /// Inputs of slabs [0, steps) onto what stands for their rays: in place of classifying and compositing
     /// them.
     void (*project)(const RayPacket&, int steps, const Samples&, ProjectionPacket&) = nullptr;
+
+    /// The kernel that runs each segment, where one has more than one kernel to choose from.
+    std::array<Instance, kSegments> instances{};
+    void chose(Segment segment, std::string name, std::string why_not_faster = {}) {
+        instances[static_cast<std::size_t>(segment)] = {std::move(name), std::move(why_not_faster)};
+    }
 };
 
 /// How one stage runs: bits of its lanes, 32 or 64, and what its kernel may take for granted; or in floats.
@@ -94,6 +115,15 @@ struct StageWay {
     KnownRescales known = KnownRescales::nothing;
     bool is_float = false;
 };
+/// Why a stage does not run in the narrow lanes of a kernel that takes `known` for granted; empty where it
+/// does.
+inline std::string why_not_narrow(const StageWay& way, KnownRescales known) {
+    if (way.is_float) return "words are floats";
+    if (way.bits == 64) return "words are wide";
+    if (way.known < known) return "a wire rounds by a rule of its own, or meets its limits";
+    return {};
+}
+
 struct StageWays {
     StageWay location, interpolation, classification, compositing;
     StageWay gradient, shading;  // up to the raw gradient; normalising it, and what light does
@@ -112,9 +142,11 @@ StageKernels kernels_for(const Plan& plan, const StageWays& ways, const VoxelSou
 
 // One a file of kernels.
 void ray_kernels(std::int64_t target, StageKernels& kernels);
-void sampling_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels);
+void sampling_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, const VoxelSource& source,
+                      StageKernels& kernels);
 void voxel_kernels(std::int64_t target, const VoxelSource& source, StageKernels& kernels);
 void classification_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);
+void point_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels);
 void shading_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels);
 void inside_kernels(std::int64_t target, const StageWays& ways, StageKernels& kernels);
 void compositing_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);

@@ -142,8 +142,15 @@ void compositing_kernel_of(const Plan& plan, const lanes::StageWay& way, lanes::
         else
             choose.template operator()<L, NoFacts<CompositingStage>>();
     });
-    if (way.bits == 32 && !way.is_float && UnitCompositing::hold(stage))
+    std::string missing = lanes::why_not_narrow(way, KnownRescales::nothing);
+    if (missing.empty()) missing = UnitCompositing::missing(stage);
+    if (missing.empty())
         choose.template operator()<Lanes<std::int32_t, KnownRescales::unit_products>, UnitCompositing>();
+    const char* const name = keeps_t                           ? "composite.depth"
+                             : missing.empty()                 ? "composite.unit15"
+                             : DefaultCompositing::hold(stage) ? "composite.default"
+                                                               : "composite";
+    kernels.chose(lanes::Segment::composite, name, missing);
     kernels.store_colors = &store_colors;
 }
 

@@ -8,6 +8,7 @@
 #include "fixedpoint/words/float_lanes-inl.h"
 #include "fixedpoint/words/lane_tables-inl.h"
 #include "pipeline/classification/entries-inl.h"
+#include "pipeline/machines/lanes/fetch-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/stages/interpolation-inl.h"
 #include "pipeline/stages/location-inl.h"
@@ -18,8 +19,10 @@ namespace {
 
 using lanes::kRays;
 
-template <class L, bool kKeepsLocation>
-void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int to, lanes::Samples& out) {
+/// Stage 1.  take_cell(at, cell): what else is to be done with the cells of samples `at` and on.
+template <class L, bool kKeepsLocation, class TakeCell>
+HWY_INLINE void locate_into(const Plan& plan, const lanes::RayPacket& packet, int from, int to,
+                            lanes::Samples& out, const TakeCell& take_cell) {
     const LocationStage stage = plan.location;  // a copy: nothing stored can change it
     const L full = constant<L>(std::int64_t{1} << stage.length_fraction);
     for (int r = 0; r < kRays; r += static_cast<int>(L::count())) {
@@ -44,6 +47,7 @@ void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int
                 if constexpr (kKeepsLocation) store(location[a], out.location[a].v + at);
             });
             store(length, out.length.v + at);
+            take_cell(at, position.cell);
         };
         if constexpr (!RealWord<L>) {
             // A batch that ends before any ray's last slab, its two ends inside the box: nothing is clamped.
@@ -77,6 +81,20 @@ void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int
             keep(at, cell_position(stage, location), select(k == last_slab, last_length, full));
         }
     }
+}
+
+template <class L, bool kKeepsLocation>
+void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int to, lanes::Samples& out) {
+    locate_into<L, kKeepsLocation>(plan, packet, from, to, out, [](int, const std::array<L, 3>&) {});
+}
+template <class L, bool kKeepsLocation>
+void locate_and_address_rows(const Plan& plan, const lanes::VoxelSource& source,
+                             const lanes::RayPacket& packet, int from, int to, lanes::Samples& out) {
+    const CellPlaces places(source);
+    locate_into<L, kKeepsLocation>(
+        plan, packet, from, to, out, [&](int at, const std::array<L, 3>& cell) SQUINT_WRITTEN_OUT {
+            store_whole(L{places(cell[0].v, cell[1].v, cell[2].v)}, out.place.v + at);
+        });
 }
 
 template <class L>
@@ -115,15 +133,18 @@ struct PackedCell {
     }
 };
 
+template <class L>
+HWY_INLINE std::array<L, 3> weights_at(const lanes::Samples& samples, int at) {
+    return {load<L>(samples.weight[0].v + at), load<L>(samples.weight[1].v + at),
+            load<L>(samples.weight[2].v + at)};
+}
 /// Stage 2 of fetched corners.
 template <class L, bool kBelow15Bits>
 HWY_INLINE L stored_sample(const InterpolationStage& stage, const lanes::Samples& samples, int at) {
     PackedCell<L, kBelow15Bits> cell;
     cell.pair = {load<L>(samples.pair[0].v + at), load<L>(samples.pair[1].v + at),
                  load<L>(samples.pair[2].v + at), load<L>(samples.pair[3].v + at)};
-    const std::array<L, 3> weight{load<L>(samples.weight[0].v + at), load<L>(samples.weight[1].v + at),
-                                  load<L>(samples.weight[2].v + at)};
-    return interpolate(stage, cell, weight);
+    return interpolate(stage, cell, weights_at<L>(samples, at));
 }
 
 template <class L, bool kBelow15Bits>
@@ -150,9 +171,54 @@ void interpolate_rows(const Plan& plan, int from, int to, lanes::Samples& sample
             store(classification_input(input, load<I>(samples.input.v + at)), samples.input.v + at);
 }
 
+/// Stage 2 of cells in blocks, whose corners stay in registers.
+template <class L, class T, bool kBelow15Bits>
+void fetch_and_interpolate_rows(const Plan& plan, const lanes::VoxelSource& source, int from, int to,
+                                lanes::Samples& samples, int next_from, int next_to,
+                                const lanes::Samples& next) {
+    const InterpolationStage stage = plan.interpolation;
+    const InputStage input = plan.input;
+    CellCorners<T> corners(source);
+    int asked = next_from;
+    for (int row = from; row < to; ++row) {
+        if (asked < next_to) request_cells<T>(source, next, asked++);
+        for (int at = row * kRays; at < (row + 1) * kRays; at += static_cast<int>(L::count())) {
+            const auto pairs = corners.pairs(samples, at);
+            const PackedCell<L, kBelow15Bits> cell{{L{pairs[0]}, L{pairs[1]}, L{pairs[2]}, L{pairs[3]}}};
+            const L sample = interpolate(stage, cell, weights_at<L>(samples, at));
+            store(classification_input(input, sample), samples.input.v + at);
+        }
+    }
+    for (; asked < next_to; ++asked) request_cells<T>(source, next, asked);
+}
+
+/// The segments of two stages each: cells in blocks, in narrow lanes that round halves up.
+void fused_kernels_of(const Plan& plan, const lanes::StageWays& ways, const lanes::VoxelSource& source,
+                      lanes::StageKernels& kernels) {
+    using lanes::Segment;
+    constexpr KnownRescales kKnown = KnownRescales::halves_up;
+    using L = Lanes<std::int32_t, kKnown>;
+    if constexpr (L::count() > 1) {
+        std::string missing = !source.cells ? "the volume lies as it is" : "";
+        for (const lanes::StageWay& way : {ways.location, ways.interpolation, ways.input})
+            if (missing.empty()) missing = lanes::why_not_narrow(way, kKnown);
+        if (!missing.empty()) return kernels.chose(Segment::fetch, "fetch", missing);
+        kernels.locate_address =
+            plan.keeps_locations() ? &locate_and_address_rows<L, true> : &locate_and_address_rows<L, false>;
+        kernels.chose(Segment::locate_address, "locate+address");
+        const bool bytes = source.volume->type == ScalarType::u8;
+        kernels.fetch_interpolate = bytes ? &fetch_and_interpolate_rows<L, std::uint8_t, true>
+                                    : source.volume->largest < 1 << 15
+                                        ? &fetch_and_interpolate_rows<L, std::uint16_t, true>
+                                        : &fetch_and_interpolate_rows<L, std::uint16_t, false>;
+        kernels.chose(Segment::fetch_interpolate, bytes ? "fetch+interpolate.u8" : "fetch+interpolate.u16");
+    }
+}
+
 }  // namespace
 
-void sampling_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::StageKernels& kernels) {
+void sampling_kernels_of(const Plan& plan, const lanes::StageWays& ways, const lanes::VoxelSource& source,
+                         lanes::StageKernels& kernels) {
     lanes::with_word<Lanes, KnownRescales::halves_up>(ways.location, [&]<class L>() {
         kernels.locate = plan.keeps_locations() ? &locate_rows<L, true> : &locate_rows<L, false>;
         kernels.step_aside = &step_rows_aside<L>;
@@ -170,6 +236,7 @@ void sampling_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::
                     below_15_bits ? &interpolate_rows<L, I, true> : &interpolate_rows<L, I, false>;
             });
     });
+    fused_kernels_of(plan, ways, source, kernels);
 }
 
 }  // namespace squint::HWY_NAMESPACE
@@ -177,8 +244,9 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace squint::lanes {
-void sampling_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels) {
-    SQUINT_CALL_TARGET(target, sampling_kernels_of, plan, ways, kernels)
+void sampling_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, const VoxelSource& source,
+                      StageKernels& kernels) {
+    SQUINT_CALL_TARGET(target, sampling_kernels_of, plan, ways, source, kernels)
 }
 }  // namespace squint::lanes
 #endif

@@ -144,6 +144,13 @@ void shading_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::S
     }
     constexpr KnownRescales kEven = KnownRescales::halves_to_even;
     const bool narrow = plan.volume->largest < 1 << 15 && DefaultGradient::hold(plan.gradient);
+    std::string missing;
+    for (const lanes::StageWay& way : {ways.gradient, ways.shading})
+        if (missing.empty()) missing = lanes::why_not_narrow(way, kEven);
+    if (missing.empty() && plan.volume->largest >= 1 << 15) missing = "voxels have 16 bits";
+    if (missing.empty()) missing = DefaultGradient::missing(plan.gradient);
+    if (missing.empty()) missing = DefaultShading::missing(plan.shading);
+    kernels.chose(lanes::Segment::light, missing.empty() ? "light.default" : "light", missing);
     lanes::with_integer_word<Lanes, kEven>(ways.gradient, [&]<class G>() {
         kernels.find_gradients = &find_gradients<G, NoGradient>;
         if constexpr (std::is_same_v<G, Lanes<std::int32_t, kEven>>)

@@ -7,6 +7,7 @@
 #include <hwy/foreach_target.h>
 
 #include "fixedpoint/words/lane_tables-inl.h"
+#include "pipeline/machines/lanes/fetch-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/machines/lanes/packing-inl.h"
 #include "pipeline/stages/faces.h"
@@ -40,15 +41,6 @@ HWY_INLINE Word pair_at(const std::uint8_t* voxels) {
 }
 
 // ------------------------------------------------------------------------------- the volume itself
-
-template <class T>
-HWY_INLINE const T* corner_of(const Volume& volume, const Samples& s, int i) {
-    return static_cast<const T*>(volume.data.get()) + s.cell[0].v[i] +
-           volume.dims.x * (s.cell[1].v[i] + volume.dims.y * s.cell[2].v[i]);
-}
-
-// A packet's outermost rays stand for those between them.
-constexpr int kOutermost[] = {0, kSide - 1, kRays - kSide, kRays - 1};
 
 /// kNumbered: the number of any voxel fits a word; the cells' lowest corners are numbered in `place`.
 template <class T, bool kNumbered>
@@ -86,57 +78,25 @@ void fetch_linear(const VoxelSource& source, int from, int to, Samples& s) {
 // ------------------------------------------------------------------------------------------- cells
 
 template <class T>
+void request_rows_of_cells(const VoxelSource& source, int from, int to, const Samples& s) {
+    for (int row = from; row < to; ++row) request_cells<T>(source, s, row);
+}
+template <class T>
 void prefetch_cells(const VoxelSource& source, int from, int to, Samples& s) {
     const hn::ScalableTag<Word> d;
-    constexpr int kBits = lanes::CellBlocks::kBits;
-    const auto in_block = hn::Set(d, (1 << kBits) - 1), row = hn::Set(d, static_cast<Word>(source.blocks.x)),
-               slice = hn::Set(d, static_cast<Word>(source.blocks.x * source.blocks.y));
-    for (int at = from * kRays; at < to * kRays; at += kLanes) {
-        const auto x = hn::Load(d, s.cell[0].v + at), y = hn::Load(d, s.cell[1].v + at),
-                   z = hn::Load(d, s.cell[2].v + at);
-        const auto block = hn::Add(
-            hn::ShiftRight<kBits>(x),
-            hn::Add(hn::Mul(row, hn::ShiftRight<kBits>(y)), hn::Mul(slice, hn::ShiftRight<kBits>(z))));
-        const auto inside = [&](auto p) { return hn::And(p, in_block); };
-        const auto offset =
-            hn::Or(inside(x), hn::Or(hn::ShiftLeft<kBits>(inside(y)), hn::ShiftLeft<2 * kBits>(inside(z))));
-        const auto slot = hn::GatherIndex(d, source.slots.data(), block);
-        hn::Store(hn::Or(slot, offset), d, s.place.v + at);  // -1 stays -1
-    }
-    // As numbers: a cell that is not there has an address before all others, which a request may name.
-    const auto cells = reinterpret_cast<std::intptr_t>(source.cells);
-    for (int i = from * kRays; i < to * kRays; i += kRays)
-        for (const int ray : kOutermost)
-            __builtin_prefetch(reinterpret_cast<const void*>(
-                cells + std::intptr_t{s.place.v[i + ray]} * static_cast<std::intptr_t>(8 * sizeof(T))));
+    const CellPlaces places(source);
+    for (int at = from * kRays; at < to * kRays; at += kLanes)
+        hn::Store(places(hn::Load(d, s.cell[0].v + at), hn::Load(d, s.cell[1].v + at),
+                         hn::Load(d, s.cell[2].v + at)),
+                  d, s.place.v + at);
+    // Not by a call of the above, which compilers drop: it does nothing else.
+    for (int row = from; row < to; ++row) request_cells<T>(source, s, row);
 }
 template <class T>
 void fetch_cells(const VoxelSource& source, int from, int to, Samples& s) {
-    const hn::ScalableTag<Word> d;
-    const PairOffsets offsets(source.volume->dims);
-    T spare[kLanes][8];
-    const auto spared = [&](int lane, int at) {  // a cell that is not there is put together here
-        const T* corner = corner_of<T>(*source.volume, s, at + lane);
-        for (int p = 0; p < 4; ++p)
-            spare[lane][2 * p] = corner[offsets.pair[p]],
-                            spare[lane][2 * p + 1] = corner[offsets.pair[p] + 1];
-        return reinterpret_cast<const std::uint8_t*>(spare[lane]);
-    };
-    const auto load = [](auto&& address) {
-        if constexpr (sizeof(T) == 1)
-            return load_widened_quads(address);
-        else
-            return load_quads(address);
-    };
+    CellCorners<T> corners(source);
     for (int at = from * kRays; at < to * kRays; at += kLanes) {
-        const Word* place = s.place.v + at;
-        const auto there = [&](int lane) {
-            return source.cells + std::int64_t{place[lane]} * static_cast<std::int64_t>(8 * sizeof(T));
-        };
-        const bool all_there = hn::AllFalse(d, hn::Lt(hn::Load(d, place), hn::Zero(d)));
-        const auto pairs =
-            all_there ? load(there)
-                      : load([&](int lane) { return place[lane] < 0 ? spared(lane, at) : there(lane); });
+        const auto pairs = corners.pairs(s, at);
         for (std::size_t p = 0; p < 4; ++p) store(Lanes<Word>{pairs[p]}, s.pair[p].v + at);
     }
 }
@@ -407,7 +367,8 @@ void pass_over_rows(const lanes::RayPacket& rays, int from, int to, lanes::Pixel
 template <class T>
 void choose_voxel_kernels(const VoxelSource& source, lanes::StageKernels& kernels) {
     if (source.cells)
-        kernels.prefetch = &prefetch_cells<T>, kernels.fetch = &fetch_cells<T>;
+        kernels.prefetch = &prefetch_cells<T>, kernels.request = &request_rows_of_cells<T>,
+        kernels.fetch = &fetch_cells<T>;
     else if (source.volume->voxels() <= std::numeric_limits<Word>::max())
         kernels.prefetch = &prefetch_linear<T, true>, kernels.fetch = &fetch_linear<T, true>;
     else

@@ -6,6 +6,7 @@
 #include "pipeline/machines/lanes/targets.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -98,6 +99,27 @@ bool may_be_met(const BlockBox& box, const EmptySpace* empty, const Index3& cell
             for (auto x = low.x; x < end.x; ++x)
                 if (empty->at(x, y, z) <= kSteps >> kBlockBits) return true;
     return false;
+}
+
+// Whether cells pay: where a block is met by many more samples than it takes voxels to build.
+bool cells_pay(const Plan& plan) {
+    const Volume& volume = *plan.volume;
+    const double samples = static_cast<double>(plan.camera.width) * plan.camera.height *
+                           static_cast<double>(std::max({volume.dims.x, volume.dims.y, volume.dims.z})) /
+                           plan.scene.sampling.step;
+    return samples >= 8 * static_cast<double>(volume.voxels());
+}
+
+// Whether a packet spans so many voxels that its outermost rays' cells do not stand for the others'.
+bool rays_lie_apart(const Plan& plan) {
+    constexpr double kVoxels = 2;
+    const Camera& camera = plan.camera;
+    double pitch = 2 * camera.half_height / camera.height;  // of pixels, world
+    if (camera.projection == Projection::perspective) {
+        const Vec3 middle = (plan.box_low + plan.box_high) * 0.5;
+        pitch *= std::max((middle - camera.eye).dot(camera.view), 0.0);
+    }
+    return (kSide - 1) * pitch > kVoxels * plan.volume->smallest_spacing();
 }
 
 // Whether a pixel that has gathered nothing is black and clear to the last bit.
@@ -231,6 +253,7 @@ LaneRenderer::LaneRenderer(const Plan& plan, const RenderOptions& options)
     if (options.skip && plan.skips_empty_space) find_empty();
     choose_layout(options);
     kernels_ = kernels_for(plan, ways_, voxels_, target_);
+    schedule_ = schedule_of(plan, kernels_);
     if (empty_ && !plan.projection_mode && nothing_is_black(plan)) seen_ = visible_packets(plan, *empty_);
 }
 
@@ -255,27 +278,24 @@ void LaneRenderer::choose_layout(const RenderOptions& options) {
         layout_ = "linear: as asked";
         return;
     }
-    if (options.layout == LayoutRule::automatic) {
-        // Cells pay where a block is met by many more samples than it takes voxels to build.
-        const double samples = static_cast<double>(plan_.camera.width) * plan_.camera.height *
-                               static_cast<double>(std::max({volume.dims.x, volume.dims.y, volume.dims.z})) /
-                               plan_.scene.sampling.step;
-        if (samples < 8 * static_cast<double>(volume.voxels())) {
-            layout_ = "linear: too few samples for cells to pay";
-            return;
-        }
+    if (options.layout == LayoutRule::automatic && !cells_pay(plan_)) {
+        layout_ = "linear: too few samples for cells to pay";
+        return;
     }
     const std::int64_t room = std::max<std::int64_t>(room_ - CellBlocks::table_bytes_of(volume), 0);
     cells_ = cell_blocks(volume, room, options.layout_bytes >= 0);
     if (cells_->room() > 0) {
         build_cells(cells_, volume, blocks_met(plan_), empty_);
         voxels_.cells = cells_->data(), voxels_.blocks = cells_->blocks(), voxels_.slots = cells_->slots();
+        voxels_.requests_all = rays_lie_apart(plan_);
     }
     layout_ = fmt::format("cells: 2x2x2 voxels side by side, {:.1f} MiB if all were met, room for {:.1f} MiB",
                           static_cast<double>(all) / 0x1p20, static_cast<double>(cells_->room()) / 0x1p20);
 }
 
-std::string words_in_lanes(const Plan& plan) {
+namespace {
+
+std::string words_of(const Plan& plan) {
     if (plan.float32) return "float32 lanes";
     const StageWays ways = ways_of(plan);
     if (plan.projection_mode)
@@ -288,8 +308,25 @@ std::string words_in_lanes(const Plan& plan) {
     return text;
 }
 
+std::string words_and_schedule(const Plan& plan, const Schedule& schedule) {
+    std::string text = fmt::format("{}; schedule {}", words_of(plan), schedule.name);
+    if (!schedule.missed.empty()) text += fmt::format(" ({})", fmt::join(schedule.missed, "; "));
+    return text;
+}
+
+}  // namespace
+
+std::string words_in_lanes(const Plan& plan) {
+    static constexpr std::uint8_t kSomewhere = 0;
+    VoxelSource source;
+    source.volume = plan.volume.get();
+    source.cells = cells_pay(plan) ? &kSomewhere : nullptr;
+    return words_and_schedule(plan,
+                              schedule_of(plan, kernels_for(plan, ways_of(plan), source, find_target(""))));
+}
+
 std::string LaneRenderer::why() const {
-    std::string text = words_in_lanes(plan_);
+    std::string text = words_and_schedule(plan_, schedule_);
     if (empty_)
         text += fmt::format("; {} of {} blocks visible", empty_->visible_blocks, empty_->distance.size());
     if (no_room_to_skip_) text += "; empty space is visited, for there is no room for its blocks";
@@ -307,7 +344,7 @@ void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& 
     if (plan_.lit) w.lit = {};  // lanes behind the last gathered sample are computed, too
     if (plan_.shares_ends()) w.ends = {}, w.end_gradients = {};
     if (plan_.inside.rule == InsideRule::adaptive) w.picked = w.pieces = {}, w.cut = {};
-    PacketLoop loop(plan_, kernels_, voxels_, empty_.get(), w);
+    PacketLoop loop(plan_, kernels_, schedule_, voxels_, empty_.get(), w);
     const bool colors_alone = !plan_.projection_mode && image.channels.size() == 4;
     for (int y = top; y < bottom; y += kSide)
         for (int x = left; x < right; x += kSide) {

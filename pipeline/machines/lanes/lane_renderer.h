@@ -19,7 +19,8 @@ namespace squint::lanes {
 /// What keeps a plan from the lanes, in one line; none when they can run it.
 std::optional<std::string> what_needs_the_model(const Plan& plan);
 
-/// The words of a plan that they can run, in one line.
+/// The words of a plan that they can run, and its schedule: the kernel of each segment, and why no faster one
+/// runs it.  In one line; of the best target, with cells where they pay and memory has room for them.
 std::string words_in_lanes(const Plan& plan);
 
 class LaneRenderer {
@@ -46,6 +47,7 @@ class LaneRenderer {
     std::int64_t target_;
     StageWays ways_;
     StageKernels kernels_;
+    Schedule schedule_;
     std::shared_ptr<const EmptySpace> empty_;
     ScreenMask seen_;
     CountSlabs count_slabs_;

@@ -72,10 +72,11 @@ Pixel<W> finished(const PixelPacket& pixels, int r, Pixel<W> pixel = {}) {
 
 class PacketLoop {
   public:
-    PacketLoop(const Plan& plan, const StageKernels& kernels, const VoxelSource& voxels,
-               const EmptySpace* empty, Workspace& w)
+    PacketLoop(const Plan& plan, const StageKernels& kernels, const Schedule& schedule,
+               const VoxelSource& voxels, const EmptySpace* empty, Workspace& w)
         : plan_(plan),
           kernels_(kernels),
+          schedule_(schedule),
           voxels_(voxels),
           empty_(empty),
           w_(w),
@@ -168,7 +169,14 @@ class PacketLoop {
 
     Samples& here() { return w_.samples[current_]; }
 
-    // A batch's slabs through all stages.  `next`: the batch behind it, no rows where that is not known.
+    // Rows of a batch's samples.
+    struct RowsOf {
+        Samples& samples;
+        int from, to;
+    };
+
+    // A batch's slabs through the segments of the schedule.  `next`: the batch behind it, no rows where that
+    // is not known.
     void batch(const Rows& rows, const Rows& next, bool carried) {
         const int back = plan_.samples_both_ends() ? 1 : 0;
         const int from = carried ? 1 : 0, to = rows.count + back;
@@ -177,39 +185,65 @@ class PacketLoop {
             if (carried) carry(w_.samples[1 - current_], here());
         } else {
             if (carried) carry(here(), here());
-            locate(here(), rows.first, from, to);
+            run_ahead({here(), from, to}, rows.first);
+            // Else its voxels were asked for by the batch before.
+            if (schedule_.asks_ahead) kernels_.request(voxels_, from, to, here());
         }
-        Samples& s = here();
-        look_ahead(next, next.first == rows.end() ? back : 0);
-        kernels_.fetch(voxels_, from, to, s);
-        kernels_.interpolate(plan_, from, to, s);
-        visited_ += rows.count * w_.rays.rays;
+        // Locations of the batch to come, and its voxels on their way from memory while this batch computes.
+        const RowsOf behind{w_.samples[1 - current_], next.first == rows.end() ? back : 0,
+                            next.count == 0 ? 0 : next.count + back};
+        located_ = next.count == 0 ? -1 : next.first;
+        if (next.count > 0) run_ahead(behind, next.first);
         last_count_ = rows.count;
-        if (plan_.projection_mode) {
-            kernels_.project(w_.rays, rows.count, s, w_.projection);
-            return;
-        }
-        kernels_.classify(plan_, rows.count, s);
+        visited_ += rows.count * w_.rays.rays;
         if (!carried) w_.end_gradients.known = {};
         if (notes_) w_.notes.in_pieces = {};
-        const int lit = plan_.lit ? light(rows.count) : 0;
+        for (const Segment segment : schedule_.now)
+            run_segment(segment, {here(), from, to}, behind, rows.count);
+    }
+
+    // The segments that a batch is ahead by, from slab k on.
+    void run_ahead(const RowsOf& rows, int k) {
+        rows.samples.first = k;
+        for (const Segment segment : schedule_.ahead) run_segment(segment, rows, rows, 0);
+    }
+
+    // `rows` of samples, and the first `slabs` slabs between them; `next`: rows that may be asked for
+    // meanwhile.
+    void run_segment(Segment segment, const RowsOf& rows, const RowsOf& next, int slabs) {
+        Samples& s = rows.samples;
+        switch (segment) {
+            case Segment::locate:
+                return kernels_.locate(plan_, w_.rays, rows.from, rows.to, s);
+            case Segment::address:
+                return kernels_.prefetch(voxels_, rows.from, rows.to, s);
+            case Segment::locate_address:
+                return kernels_.locate_address(plan_, voxels_, w_.rays, rows.from, rows.to, s);
+            case Segment::fetch:
+                return kernels_.fetch(voxels_, rows.from, rows.to, s);
+            case Segment::interpolate:
+                return kernels_.interpolate(plan_, rows.from, rows.to, s);
+            case Segment::fetch_interpolate:
+                return kernels_.fetch_interpolate(plan_, voxels_, rows.from, rows.to, s, next.from, next.to,
+                                                  next.samples);
+            case Segment::classify:
+                return kernels_.classify(plan_, slabs, s);
+            case Segment::light:
+                lit_ = light(slabs);
+                return;
+            case Segment::composite:
+                return composite(slabs);
+            case Segment::classify_composite:
+                return kernels_.classify_composite(plan_, w_.rays, slabs, s, w_.pixels);
+            case Segment::project:
+                return kernels_.project(w_.rays, slabs, s, w_.projection);
+        }
+    }
+
+    void composite(int slabs) {
         if (notes_) w_.notes.samples_before = w_.pixels.samples;
-        kernels_.composite(plan_, w_.rays, rows.count, s, w_.pixels, w_.notes.between);
-        if (notes_) note(lit);
-    }
-
-    void locate(Samples& s, int k, int from, int to) {
-        s.first = k;
-        kernels_.locate(plan_, w_.rays, from, to, s);
-        kernels_.prefetch(voxels_, from, to, s);
-    }
-
-    // Locations of the batch to come, and its voxels on their way from memory while this batch computes.
-    void look_ahead(const Rows& next, int from) {
-        located_ = -1;
-        if (next.count == 0) return;
-        locate(w_.samples[1 - current_], next.first, from, next.count + (plan_.samples_both_ends() ? 1 : 0));
-        located_ = next.first;
+        kernels_.composite(plan_, w_.rays, slabs, here(), w_.pixels, w_.notes.between);
+        if (notes_) note(lit_);
     }
 
     // One batch's last row becomes the next one's first.
@@ -375,11 +409,13 @@ class PacketLoop {
 
     const Plan& plan_;
     const StageKernels& kernels_;
+    const Schedule& schedule_;
     const VoxelSource& voxels_;
     const EmptySpace* empty_;
     Workspace& w_;
     bool backwards_;
-    bool notes_;  // depth or normals are asked for
+    bool notes_;   // depth or normals are asked for
+    int lit_ = 0;  // slabs of the batch at hand
     int current_ = 0;
     int located_ = -1;    // first slab of the batch whose locations stand in the other buffer
     int last_count_ = 0;  // slabs of the last batch

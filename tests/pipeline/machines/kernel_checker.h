@@ -128,6 +128,20 @@ class KernelChecker {
             "interpolate_scalars", [this] { draw_corners(), draw_weights(samples_->weight, kBatch); },
             [this, rows] { kernels_.interpolate_scalars(plan_, 0, rows, *samples_); },
             [this, rows] { return interpolate_difference(rows, false); });
+        if (kernels_.locate_address)
+            add(
+                "locate+address",
+                [this] { draw_rays(), samples_->first = static_cast<Word>(below(rays_.most_slabs)); },
+                [this, rows] { kernels_.locate_address(plan_, c_.source, rays_, 0, rows, *samples_); },
+                [this, rows] { return locate_address_difference(rows); });
+        if (kernels_.fetch_interpolate)
+            add(
+                "fetch+interpolate",
+                [this, rows] { draw_cells(), kernels_.prefetch(c_.source, 0, rows, *samples_); },
+                [this, rows] {
+                    kernels_.fetch_interpolate(plan_, c_.source, 0, rows, *samples_, 0, rows, *samples_);
+                },
+                [this, rows] { return sample_difference(rows); });
         add(
             "classify", [this] { draw_inputs(); }, [this] { kernels_.classify(plan_, kSteps, *samples_); },
             [this] { return classify_difference(); });
@@ -135,6 +149,14 @@ class KernelChecker {
             "composite", [this] { draw_rays(), draw_slabs(), draw_pixels(); },
             [this] { kernels_.composite(plan_, rays_, kSteps, *samples_, pixels_, between_); },
             [this] { return composite_difference(); });
+        if (kernels_.classify_composite)
+            add(
+                "classify+composite", [this] { draw_rays(), draw_inputs(), draw_pixels(); },
+                [this] { kernels_.classify_composite(plan_, rays_, kSteps, *samples_, pixels_); },
+                [this] {
+                    classify_as_the_model();
+                    return composite_difference();
+                });
         if (plan_.compositing.form != CompositingForm::back_to_front)
             add(
                 "hide", [this] { draw_rays(), draw_slabs(), draw_pixels(), before_ = *samples_; },
@@ -359,6 +381,22 @@ class KernelChecker {
             });
         });
     }
+    std::string locate_address_difference(int rows) {
+        if (auto text = locate_difference(rows); !text.empty()) return text;
+        before_ = *samples_;
+        kernels_.prefetch(c_.source, 0, rows, *samples_);
+        return first_of(rows * kRays,
+                        [&](int i) { return differs("place", i, samples_->place.v[i], before_.place.v[i]); });
+    }
+    std::string sample_difference(int rows) {
+        using namespace squint::HWY_NAMESPACE;
+        const FromVolume voxels{*plan_.volume};
+        return first_of(rows * kRays, [&](int i) {
+            const Integer sample = interpolate(plan_.interpolation, voxels.cell(three(samples_->cell, i)),
+                                               three(samples_->weight, i));
+            return differs("input", i, classification_input(plan_.input, sample), samples_->input.v[i]);
+        });
+    }
     std::string interpolate_difference(int rows, bool to_input) {
         using namespace squint::HWY_NAMESPACE;
         return first_of(rows * kRays, [&](int i) {
@@ -390,6 +428,21 @@ class KernelChecker {
                                        samples_->color[c].v[i]);
                     });
                 });
+            },
+            plan_.method);
+    }
+    void classify_as_the_model() {
+        std::visit(
+            [&](const auto& method) {
+                using namespace squint::HWY_NAMESPACE;
+                for (int i = 0; i < kSteps * kRays; ++i) {
+                    const Integer input = samples_->input.v[i];
+                    const Slab<Integer> slab =
+                        HWY_NAMESPACE::classify(method, input, input, Integer{samples_->length.v[i]});
+                    samples_->alpha.v[i] = static_cast<Word>(slab.alpha);
+                    for (std::size_t c = 0; c < 3; ++c)
+                        samples_->color[c].v[i] = static_cast<Word>(slab.color[c]);
+                }
             },
             plan_.method);
     }

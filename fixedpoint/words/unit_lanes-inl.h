@@ -1,0 +1,125 @@
+// Numbers from 0 to 1 of 15 fraction bits, 16 bits each: lanes for compositing where a plan has proven that
+// nothing else occurs.
+#if defined(SQUINT_FIXEDPOINT_WORDS_UNIT_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef SQUINT_FIXEDPOINT_WORDS_UNIT_LANES_INL_H
+#undef SQUINT_FIXEDPOINT_WORDS_UNIT_LANES_INL_H
+#else
+#define SQUINT_FIXEDPOINT_WORDS_UNIT_LANES_INL_H
+#endif
+
+#include "fixedpoint/words/lanes-inl.h"
+
+#include <array>
+#include <cassert>
+#include <cstdint>
+
+HWY_BEFORE_NAMESPACE();
+namespace squint::HWY_NAMESPACE {
+
+// x86's rounding multiplication takes -1 by -1 to -1, others saturate.
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_SSE4
+inline constexpr bool kHasUnitLanes = true;
+
+/// Raw x stands as -x, for -2^15 fits 16 bits and 2^15 does not.  Sixteen at most, in an order of their own: that
+/// of narrow_words().
+struct UnitLanes {
+    using D = hn::CappedTag<std::int16_t, 16>;
+    hn::Vec<D> v;
+    static constexpr std::size_t count() {
+        return HWY_LANES(std::int16_t) < 16 ? HWY_LANES(std::int16_t) : 16;
+    }
+};
+struct UnitMask {
+    hn::Mask<UnitLanes::D> m;
+};
+
+HWY_INLINE UnitLanes make_word(WordTag<UnitLanes>, std::int64_t value) {
+    return {hn::Set(UnitLanes::D(), static_cast<std::int16_t>(-value))};
+}
+HWY_INLINE UnitLanes operator+(UnitLanes a, UnitLanes b) {
+    return {hn::Add(a.v, b.v)};
+}
+HWY_INLINE UnitLanes operator-(UnitLanes a, UnitLanes b) {
+    return {hn::Sub(a.v, b.v)};
+}
+HWY_INLINE UnitMask operator<(UnitLanes a, UnitLanes b) {
+    return {hn::Lt(b.v, a.v)};
+}
+HWY_INLINE UnitMask operator&(UnitMask a, UnitMask b) {
+    return {hn::And(a.m, b.m)};
+}
+HWY_INLINE UnitMask operator!(UnitMask a) {
+    return {hn::Not(a.m)};
+}
+HWY_INLINE bool any(UnitMask a) {
+    return !hn::AllFalse(UnitLanes::D(), a.m);
+}
+/// x where c, else 0.
+HWY_INLINE UnitLanes only(UnitMask c, UnitLanes x) {
+    return {hn::IfThenElseZero(c.m, x.v)};
+}
+HWY_INLINE UnitLanes shift_left(UnitLanes x, int bits) {
+    return {shift_left_same(x.v, bits)};
+}
+/// Sums pass on; only products lose bits.
+HWY_INLINE UnitLanes quantise(UnitLanes x, const Rescale& to) {
+    assert(to.shift == 0 && !to.limits);
+    (void)to;
+    return x;
+}
+/// Halves to even.  Rounded up, 1 comes out as -2^15; an odd product of an exact half loses its last bit.
+HWY_INLINE UnitLanes quantised_product(UnitLanes a, UnitLanes b, const Rescale& to) {
+    assert(to.shift == 15 && to.to_even == 1 && !to.limits);
+    (void)to;
+    const UnitLanes::D d;
+    const auto up = hn::MulFixedPoint15(a.v, b.v);
+    // Of the product's low 16 bits: 15 that are dropped, a half, below an even number.
+    const auto half = hn::VecFromMask(d, hn::Eq(hn::Mul(a.v, b.v), hn::Set(d, 0x4000)));
+    return {hn::Sub(hn::Zero(d), hn::Add(up, half))};
+}
+
+/// Vectors of L that hold as many words as UnitLanes.
+template <class L>
+inline constexpr std::size_t kPartsOfUnits = UnitLanes::count() / L::count();
+template <class L>
+using UnitParts = std::array<L, kPartsOfUnits<L>>;
+
+/// Words of 32 bits that fit 16, in the order of UnitLanes; and back.
+template <class L>
+HWY_INLINE hn::Vec<UnitLanes::D> narrow_words(const UnitParts<L>& x) {
+    const UnitLanes::D d;
+    if constexpr (kPartsOfUnits<L> == 1)
+        return hn::DemoteTo(d, x[0].v);
+    else
+        return hn::ReorderDemote2To(d, x[0].v, x[1].v);
+}
+template <class L>
+HWY_INLINE UnitParts<L> widen_words(hn::Vec<UnitLanes::D> x) {
+    const hn::ScalableTag<typename L::Element> d;
+    if constexpr (kPartsOfUnits<L> == 1) {
+        return {L{hn::PromoteTo(d, x)}};
+    } else {
+        const UnitLanes::D d16;
+        const auto part = [&](auto twice) { return L{hn::ShiftRight<16>(hn::BitCast(d, twice))}; };
+        return {part(hn::InterleaveLower(d16, x, x)), part(hn::InterleaveUpper(d16, x, x))};
+    }
+}
+template <class L>
+HWY_INLINE UnitLanes units_of(const UnitParts<L>& x) {
+    UnitParts<L> below;
+    for (std::size_t i = 0; i < kPartsOfUnits<L>; ++i) below[i] = constant<L>(0) - x[i];
+    return {narrow_words<L>(below)};
+}
+template <class L>
+HWY_INLINE UnitParts<L> words_of(UnitLanes x) {
+    UnitParts<L> words = widen_words<L>(x.v);
+    for (L& word : words) word = constant<L>(0) - word;
+    return words;
+}
+#else
+inline constexpr bool kHasUnitLanes = false;
+#endif
+
+}  // namespace squint::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif
