@@ -1,4 +1,4 @@
-// Quotients over any word, whatever their wire has; compiled once per SIMD target.
+// Quotients in any word, for any wire; compiled once per SIMD target.
 #if defined(SQUINT_FIXEDPOINT_QUOTIENTS_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SQUINT_FIXEDPOINT_QUOTIENTS_INL_H
 #undef SQUINT_FIXEDPOINT_QUOTIENTS_INL_H
@@ -16,8 +16,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
-/// A quotient whatever its wire: where the wire has fewer fraction bits than the exact quotient, the
-/// denominator is shifted.
+/// A quotient for any wire: where the wire has fewer fraction bits than the exact quotient, the denominator
+/// is shifted.
 template <class N>
 HWY_INLINE auto divide(const N& numerator, const N& denominator, const Rescale& to) {
     Rescale whole = to;
@@ -25,8 +25,8 @@ HWY_INLINE auto divide(const N& numerator, const N& denominator, const Rescale& 
     return quotient(numerator, to.shift > 0 ? N(shift_left(denominator, to.shift)) : denominator, whole);
 }
 
-/// What a quotient may divide by: x >= 0, or a last bit where it is zero.  Without rounding every x above zero
-/// is itself.  N: the word or its Wide.
+/// A divisor: x >= 0, or its last bit where it is zero.  Without rounding every x above zero stays as it is.
+/// N: the word or its Wide.
 template <class W, class N>
 HWY_INLINE N divisor(const N& x) {
     if constexpr (RealWord<W>)

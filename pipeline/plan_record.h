@@ -1,4 +1,4 @@
-// What a plan says of itself, for `squint plan` and records.
+// What a plan says about itself, for `squint plan` and for records.
 #pragma once
 
 #include "pipeline/plan/plan.h"

@@ -1,9 +1,9 @@
-// A word of the model and how far it can be from the same number without any rounding, by who is to blame: what a
-// certificate runs (pipeline/machines/certificate.h).
+// A word of the model with a bound on its distance from the same number without rounding, split by the
+// causes: what a certificate runs (pipeline/machines/certificate.h).
 //
-// Errors are doubles that are added, multiplied by what is not negative, and never taken from one another: all of
-// their own roundings together are below 2^-20 of them, which whoever reads a bound adds.  What an operation cannot
-// bound is infinite, never too small: a table's rows, say, whose neighbours it does not know.
+// Errors are doubles.  They are only added and multiplied by factors that are not negative, so that their own
+// roundings stay below 2^-20 of them; whoever reads a bound adds that.  An error that an operation cannot
+// bound (in a table's rows, whose neighbours it does not know) is infinite, never too small.
 #pragma once
 
 #include "fixedpoint/words/word.h"
@@ -15,7 +15,7 @@
 
 namespace squint {
 
-/// Errors, of one unit, by who makes them: a wire by its index, or what stands behind the wires.
+/// Errors in one unit, by cause: a wire's index, or one of the causes behind the wires.
 struct Shares {
     static constexpr int kMost = 36, kElsewhere = kMost - 1;
     std::array<double, kMost> of{};
@@ -46,7 +46,7 @@ inline Shares operator+(Shares a, const Shares& b) {
     a.add(b, 1);
     return a;
 }
-/// At least the sum of either.
+/// At least the sum, for both signs.
 inline Shares greatest(Shares a, const Shares& b) {
     for (std::size_t i = 0; i < a.of.size(); ++i) a.of[i] = std::max(a.of[i], b.of[i]);
     return a;
@@ -54,7 +54,7 @@ inline Shares greatest(Shares a, const Shares& b) {
 
 struct Bounded {
     Int128 v = 0;
-    bool exact = true;  // no error at all
+    bool exact = true;  // has no error at all
     Shares error;       // in units of v's last bit
 
     double most() const { return exact ? 0 : error.sum(); }
@@ -70,7 +70,7 @@ inline Bounded unbounded(Int128 v) {
     return with_error(v, Shares::one(-1, std::numeric_limits<double>::infinity()));
 }
 
-/// An answer, and whether it is the same without rounding.
+/// The answer to a comparison, and whether it is the same without rounding.
 struct Truth {
     bool is = false, sure = true;
     explicit operator bool() const { return is; }
@@ -80,13 +80,13 @@ struct Truth {
     }
     friend Truth operator|(Truth a, Truth b) { return !((!a) & (!b)); }
 };
-/// Whether it may be: what is left out for all must be false without rounding too.
+/// Whether the answer may be yes: what is skipped for all lanes must be false without rounding, too.
 inline bool any(Truth t) {
     return t.is || !t.sure;
 }
 
-/// What one quantising takes from a value: nothing where the word is the value itself, else half a last bit, or a
-/// whole one where bits are cut off, and all of what a limit takes.  In units of the result.
+/// The error of one quantising, in units of the result: none where it is exact, else half a last bit, or a
+/// whole one where bits are cut off, plus what a limit takes.
 inline double rounding_of(double taken, Rounding rounding) {
     if (taken == 0) return 0;
     return std::max(taken, rounding == Rounding::rnd || rounding == Rounding::rnd_conv ? 0.5 : 1.0);
@@ -124,7 +124,7 @@ inline Truth operator<(const Bounded& a, const Bounded& b) {
 inline Bounded shift_left(const Bounded& x, int bits) {
     return {shift_left(x.v, bits), x.exact, x.exact ? Shares{} : x.error.scaled(std::ldexp(1.0, bits))};
 }
-/// Two numbers e apart have floors e + 1 apart at most.
+/// The floors of two numbers that differ by e differ by at most e + 1.
 inline Bounded floor_shift(const Bounded& x, int bits) {
     Bounded y{x.v >> bits, x.exact, {}};
     if (!x.exact) y.error = x.error.scaled(std::ldexp(1.0, -bits)) + Shares::one(-1, 1);
@@ -163,7 +163,7 @@ inline Bounded bit_length(const Bounded& x) {
     const auto of = [](double value) { return bit_length(static_cast<Int128>(std::max(value, 0.0))); };
     return x.most() < 0x1p100 && of(x.low()) == of(x.high() + 1) ? bits : unbounded(bits.v);
 }
-/// Of a row that is the same without rounding; of others nothing is known here.
+/// Exact for a row that is the same without rounding; for others nothing is known here.
 inline Bounded gather(const Table& table, const Bounded& row, int column) {
     const auto at = static_cast<std::int64_t>(row.v);
     const Int128 word = table.word(at, column);
@@ -186,7 +186,7 @@ inline Bounded affine(const Bounded& p, const Bounded& k, const Bounded& v, std:
 inline Bounded within(const Bounded& x, std::int64_t, std::int64_t) {
     return x;
 }
-/// A length differs by no more than the vector.
+/// A length changes by no more than its vector does.
 inline Bounded vector_length(const std::array<Bounded, 3>& v, int guard) {
     Bounded x{vector_length(std::array<Int128, 3>{v[0].v, v[1].v, v[2].v}, guard), false, {}};
     for (const Bounded& a : v) x.error.add(a.error, std::ldexp(1.0, guard));

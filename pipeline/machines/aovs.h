@@ -1,4 +1,4 @@
-// Depths and normals of a picture: heard by an observer of the composition, or found beside lanes.
+// Depths and normals of a picture: an observer of the composition collects them, or the lanes' own loop does.
 #pragma once
 
 #include "pipeline/plan/plan.h"
@@ -6,8 +6,8 @@
 
 namespace squint {
 
-/// Adds a visible slab to a pixel's depths.  `z`: its front's distance from the ray's origin, world units;
-/// `before`, `after`: T in front of it and behind it, in one unit.
+/// Adds a visible slab to a pixel's depths.  `z`: the distance of its front from the ray's origin, in world
+/// units; `before`, `after`: T in front of it and behind it, in the same unit.
 template <class W>
 void note_depth(double z, double before, double after, bool backwards, Pixel<W>& pixel) {
     if (backwards) {

@@ -43,7 +43,7 @@ Pixel<std::int64_t> project_pixel(const Plan& plan, const ProjectedRay<std::int6
 void ModelRenderer::render_tile(int left, int top, int right, int bottom, Image& image,
                                 TileStatistics& statistics) const {
     if (audit_ && !plan_.real) {
-        Plan audited = plan_;  // its own counters: no thread waits for another
+        Plan audited = plan_;  // with its own counters: no thread waits for another
         statistics.wires = std::make_unique<std::array<WireStatistics, kWires>>();
         attach_statistics(audited, *statistics.wires);
         model::cast_tile<Audited>(audited, left, top, right, bottom, image, statistics);
@@ -72,7 +72,7 @@ RayTrace trace_ray(const Plan& plan, int column, int row) {
     std::vector<TraceEvent> fresh;
     for (WireStatistics& s : statistics) s.trace = &fresh;
     attach_statistics(traced, statistics);
-    // The words that render() takes: one program, one picture.
+    // The words that render() takes, so that pixel and picture agree.
     if (plan.float32)
         model::cast_traced<Real<float>>(traced, fresh, trace);
     else if (plan.real)

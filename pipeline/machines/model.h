@@ -1,5 +1,5 @@
-// The golden model: one ray, one sample at a time, in scalar words.  Every other path is held against it, bit
-// for bit.
+// The golden model: one ray, one sample at a time, in scalar words.  Every other path must give its
+// bits.
 #pragma once
 
 #include "core/image.h"
@@ -21,23 +21,23 @@ struct Pixel;
 template <class W>
 struct ProjectedRay;
 
-/// A finished pixel into every channel of an image: where fixed point meets float.
+/// Stores a finished pixel in every channel of an image: where fixed point meets float.
 void store_pixel(const Plan& plan, const Pixel<std::int64_t>& pixel, int column, int row, Image& image);
 void store_pixel(const Plan& plan, const Pixel<Real<float>>& pixel, int column, int row, Image& image);
 
-/// MIP, MinIP, average: the pixel of a ray from what stands for it.
+/// MIP, MinIP, average: the pixel of a ray, from the state of its projection.
 Pixel<std::int64_t> project_pixel(const Plan& plan, const ProjectedRay<std::int64_t>& ray);
 
 class ModelRenderer {
   public:
     explicit ModelRenderer(const Plan& plan, bool audit = false) : plan_(plan), audit_(audit) {}
 
-    /// Pixels [left, right) x [top, bottom) into every channel of `image`.  Safe to call from many threads on
-    /// disjoint tiles.
+    /// Renders pixels [left, right) x [top, bottom) into every channel of `image`.  Many threads may call it
+    /// at once for disjoint tiles.
     void render_tile(int left, int top, int right, int bottom, Image& image,
                      TileStatistics& statistics) const;
 
-    /// "64-bit integers", "double, nothing rounded", ...
+    /// The word, in a line: "64-bit integers", "double, nothing rounded", ...
     std::string why() const;
 
   private:
@@ -45,7 +45,7 @@ class ModelRenderer {
     bool audit_;
 };
 
-/// Every value on every wire along one ray, in the order it was computed.  `slab` is -1 before the first.
+/// Every value on every wire along one ray, in the order of computation.  `slab` is -1 before the first slab.
 /// Where nothing is rounded an event's `exact` is the value itself.
 struct RayTrace {
     struct Event {

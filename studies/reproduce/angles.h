@@ -1,4 +1,4 @@
-// How far the raw gradient turns from sample to sample (Guetat et al. 2010, figure 3).
+// How far the raw gradient turns between neighbouring samples (Guetat et al. 2010, figure 3).
 #pragma once
 
 #include "core/image.h"
@@ -8,9 +8,9 @@
 
 namespace squint::reproduce {
 
-/// Channels of counts along each ray: `slabs`, visible by the plan's own classification and with a gradient at both
-/// ends; `angle60` and `angle90`, those among them whose ends' gradients stand more than so many degrees apart.
-/// Gradients by shading.gradient of a plan that rounds nothing (precision.preset = "real").  Throws Cancelled.
+/// Counts along each ray, as channels: `slabs` are those that the plan's own classification shows and that
+/// have a gradient at both ends; `angle60` and `angle90` are those of them whose two gradients are more than
+/// so many degrees apart. The plan rounds nothing (precision.preset = "real").  Throws Cancelled.
 Image gradient_turns(const Plan& plan, int threads = 0, const std::atomic<bool>* cancelled = nullptr);
 
 }  // namespace squint::reproduce

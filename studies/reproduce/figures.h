@@ -1,5 +1,5 @@
-// Figures and tables of the papers as data: which pictures, which measurements, and what the paper has.  A file a paper
-// in configs/reproduce; docs/papers has a page for each.
+// Figures and tables of the papers as data: which pictures, which measurements, and the paper's numbers.  One
+// file in configs/reproduce and one page in docs/papers for each paper.
 #pragma once
 
 #include <string>
@@ -39,7 +39,7 @@ enum class Measure {
     angles,  // visible slabs whose ends' gradients stand more than 60 and more than 90 degrees apart, %
     normal_length,  // slab_light: what the linear and the quadratic normal miss of a length of one, %
 };
-/// What a measure's numbers are: "dB", "LSB8", ...
+/// The unit of a measure's numbers: "dB", "LSB8", ...
 const char* unit_of(Measure measure);
 
 struct RowOrder {
@@ -56,9 +56,9 @@ struct Figure {
     std::string title;   // one sentence
     std::string look;    // what to look for
     double seconds = 0;  // on two cores
-    bool timed = false;  // it measures time, and takes it: made only when asked for by name
+    bool timed = false;  // it measures time and takes long: made only when asked for by name
     std::string scene;
-    std::string stand_in;  // the scene where data is missing; empty: the built-in one
+    std::string stand_in;  // the scene used where data is missing; empty: the built-in one
     std::vector<std::string> settings;
     std::vector<PictureOrder> pictures;
     std::vector<RowOrder> rows;

@@ -1,5 +1,5 @@
-// Making a figure or table of a paper: its pictures as EXR and PNG, its measurements beside the paper's own numbers, in a
-// folder that an interrupted run goes on with.
+// Makes a figure or table of a paper: its pictures as EXR and PNG, its measurements beside the paper's
+// numbers, in a folder that an interrupted run continues.
 #pragma once
 
 #include "studies/reproduce/figures.h"
@@ -37,8 +37,8 @@ struct Result {
     int made = 0, kept = 0;  // items made now, and found made before
 };
 
-/// Makes what is not there already, made by this program from the same scene.  What a plan refuses, or what data is
-/// missing for, is a row or a note that says so.  Throws InputError for what cannot be written, and Cancelled.
+/// Makes what is missing or was made by another program or scene.  What a plan refuses, or for which data is
+/// missing, is a row or a note that says so.  Throws InputError where it cannot write, and Cancelled.
 Result make(const Paper& paper, const Figure& figure, const Settings& settings);
 
 /// results.json: schema squint.reproduce/1 (docs/json.md).

@@ -1,4 +1,4 @@
-// Light along one slab by three ways to turn its normal (Guetat et al. 2010, figures 1 and 2, equations 4 and 5).
+// Light along one slab, its normal turned in three ways (Guetat et al. 2010, figures 1, 2, equations 4, 5).
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@ struct SlabLightSample {
 struct SlabLight {
     double angle, exponent;
     std::vector<SlabLightSample> samples;
-    /// The largest part of a length of one that the linear and the quadratic normal miss or pass, in %.
+    /// How much of a length of one the linear and the quadratic normal lack or exceed at most, in %.
     std::array<double, 2> length_errors() const;
 };
 
@@ -26,7 +26,7 @@ struct SlabLight {
 SlabLight slab_light(double angle, double exponent);
 
 std::string csv_of(const SlabLight& light);
-/// Three panels, diffuse, specular and both, with a line a turn.
+/// Three panels (diffuse, specular and both) with a line for each way to turn.
 std::string svg_of(const SlabLight& light);
 
 }  // namespace squint::reproduce

@@ -1,20 +1,20 @@
 // squint search --guarantee pictures: formats under whose roundings no pixel of given pictures can err by more than a
 // bound, by certificates (pipeline/machines/certificate.h) and not by trying.
 //
-// A wire's share of a bound halves with every bit.  With n payers, equal shares of what walls, termination and rows of
-// tables leave of the bound take the fewest bits where a bit costs alike:
+// A bit more on a wire halves its share of a bound.  For n causes the fewest bits, where all bits cost alike,
+// give each an equal share of what walls, termination and tables leave of the bound:
 //
 //     F' = F + ceil(log2(n share / left)),
 //
-// from each wire's greatest share over all pixels.  Then bits are taken back where the tally says that they are dear
-// and the certificates that they are not needed.
+// from each wire's greatest share over all pixels.  Then bits that the tally says are dear are taken back,
+// where the certificates do not need them.
 #pragma once
 
 #include "studies/search/search.h"
 
 namespace squint::search {
 
-/// Formats, what is proven of them and what was measured, LSB8; of several pictures the greatest.
+/// Formats, what is proven of them and what was measured, in LSB8: the greatest over the pictures.
 struct Proven {
     WireSpecs specs;  // of the first scene's first view
     double bits = 0;  // by the tally: mean over the scenes
@@ -34,8 +34,8 @@ struct CertifiedResult {
     sweep::Json json;  // squint.search/1
 };
 
-/// Takes scenes, overrides, most_error, wires, views, folder, command, threads, cancelled, progress of the settings.
-/// Throws InputError for what is not bounded or cannot be used, and Cancelled.
+/// Reads scenes, overrides, most_error, wires, views, folder, command, threads, cancelled and progress.
+/// Throws InputError for scenes that cannot be bounded or used, and Cancelled.
 CertifiedResult run_by_certificate(const Settings& settings);
 
 }  // namespace squint::search

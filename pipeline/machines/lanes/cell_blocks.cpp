@@ -24,7 +24,7 @@ Index3 blocks_of(const Volume& volume) {
 int cell_bytes_of(const Volume& volume) {
     return volume.type == ScalarType::u8 ? 8 : 16;
 }
-/// The volume without its voxels' ownership: what is kept for them must not keep them alive.
+/// The volume without ownership of its voxels: what is cached for them must not keep them alive.
 Volume borrowed(const Volume& volume) {
     Volume view = volume;
     view.data = std::shared_ptr<const void>(std::shared_ptr<const void>(), volume.data.get());
@@ -92,7 +92,7 @@ void CellBlocks::build(const std::function<bool(std::int64_t)>& wanted) {
             fill(fresh[i], reinterpret_cast<std::uint16_t*>(cells));
         slots_[static_cast<std::size_t>(fresh[i])] = static_cast<std::int32_t>(place * kCells);
     };
-    // A thread that waits here must not take up work that asks for this lock.
+    // A thread that waits here must not take up work that needs this lock.
     tbb::this_task_arena::isolate([&] { tbb::parallel_for(std::size_t{0}, fresh.size(), fill_block); });
     taken_ += static_cast<std::int64_t>(fresh.size());
 }

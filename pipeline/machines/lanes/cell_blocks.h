@@ -1,5 +1,5 @@
-// The fast layout of a volume: the eight corners of a cell side by side, so that a sample is one load.  Eight
-// times the voxels' memory, so cells stand in blocks, and only blocks that rays may meet are built.
+// The fast layout of a volume: the eight corners of each cell side by side, so that a sample is one load.  It
+// takes eight times the voxels' memory, so cells form blocks, and only blocks that rays may meet are built.
 #pragma once
 
 #include "core/volume.h"
@@ -17,26 +17,26 @@ class CellBlocks {
     static constexpr int kBits = 3;  // blocks of 8 x 8 x 8 cells, x fastest
     static constexpr int kCells = 1 << 3 * kBits;
 
-    /// Room for `most_bytes` of cells, or for all there are.
+    /// Reserves `most_bytes` for cells, or enough for all.
     CellBlocks(const Volume& volume, std::int64_t most_bytes);
     ~CellBlocks();
     CellBlocks(const CellBlocks&) = delete;
     CellBlocks& operator=(const CellBlocks&) = delete;
 
-    /// Bytes of a whole volume's cells.
+    /// The bytes of all cells of a volume.
     static std::int64_t bytes_of_all(const Volume& volume);
-    /// Bytes of the table of where blocks lie.
+    /// The bytes of the table that says where blocks lie.
     static std::int64_t table_bytes_of(const Volume& volume);
 
-    /// Builds the blocks for which wanted(block) and that are not there yet, while there is room.
+    /// Builds the blocks that wanted(block) accepts and that are missing, while there is room.
     void build(const std::function<bool(std::int64_t)>& wanted);
-    /// Where each block's cells lie, in cells from data(); -1 for one that is not there.  What is there
-    /// stays.
+    /// The first cell of each block, counted in cells from data(); -1 for a block that is not built.  Built
+    /// blocks never move.
     std::vector<std::int32_t> slots() const;
     /// Corners x fastest, in the volume's own type.
     const std::uint8_t* data() const { return data_; }
     Index3 blocks() const { return blocks_; }
-    /// Built so far, and what there is room for.
+    /// Blocks built so far, and those there is room for.
     std::int64_t bytes() const;
     std::int64_t room() const { return room_ * block_bytes_; }
 
@@ -46,15 +46,15 @@ class CellBlocks {
 
     const Volume volume_;
     Index3 blocks_{0, 0, 0};
-    std::int64_t block_bytes_ = 0, room_ = 0;  // room in blocks
-    std::uint8_t* data_ = nullptr;             // reserved; its pages come as they are written
+    std::int64_t block_bytes_ = 0, room_ = 0;  // room_ in blocks
+    std::uint8_t* data_ = nullptr;             // reserved; the system adds pages as they are written
     mutable std::mutex mutex_;
     std::vector<std::int32_t> slots_;
     std::int64_t taken_ = 0;  // blocks
 };
 
-/// The cells of a volume, kept while its voxels live.  A later call may ask for another room: `strictly` for
-/// no more than this one, otherwise for about as much.
+/// The cells of a volume, cached while its voxels live.  A later call may ask for other room: `strictly` for
+/// no more than it says, otherwise for about as much.
 std::shared_ptr<CellBlocks> cell_blocks(const Volume& volume, std::int64_t most_bytes, bool strictly);
 
 }  // namespace squint::lanes

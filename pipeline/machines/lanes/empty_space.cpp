@@ -12,14 +12,14 @@
 namespace squint::lanes {
 namespace {
 
-// Ranges of the blocks along x that lie at y, z of the box.
+// The ranges of the blocks along x at y, z of the box.
 template <class T>
 void measure_row(const Volume& volume, BlockRanges& ranges, std::int64_t y, std::int64_t z) {
     const T* data = static_cast<const T*>(volume.data.get());
     const Index3 n = volume.dims, &low = ranges.box.low, &blocks = ranges.box.blocks;
     std::uint16_t* smallest = ranges.smallest.data() + (z * blocks.y + y) * blocks.x;
     std::uint16_t* largest = ranges.largest.data() + (z * blocks.y + y) * blocks.x;
-    // The voxels of each line, folded onto its blocks; a block's last voxel is its neighbour's first.
+    // Fold the voxels of each line onto its blocks; a block's last voxel is its neighbour's first.
     const auto first = [](std::int64_t block) { return block * kBlock; };
     const auto last = [](std::int64_t block, std::int64_t voxels) {
         return std::min((block + 1) * kBlock, voxels - 1);
@@ -46,11 +46,11 @@ void measure_row(const Volume& volume, BlockRanges& ranges, std::int64_t y, std:
     if (zeros) std::fill_n(smallest, blocks.x, std::uint16_t{0});
 }
 
-// Chebyshev distance to the nearest zero: one more than the nearest of a block's 26 neighbours has, 13 of
-// them on the way forth and 13 on the way back.
+// The Chebyshev distance to the nearest zero is one more than the least among a block's 26 neighbours: 13 of
+// them are visited on the way forth and 13 on the way back.
 void spread(std::vector<std::uint8_t>& distance, const Index3& blocks) {
     const auto nx = static_cast<std::size_t>(blocks.x);
-    // Of the rows already passed, with a block more on either side.
+    // The rows already passed, with a block more on either side.
     std::vector<std::uint8_t> nearest(nx + 2);
     const auto pass = [&](bool forth) {
         const std::int64_t before = forth ? -1 : 1;
@@ -84,7 +84,7 @@ void spread(std::vector<std::uint8_t>& distance, const Index3& blocks) {
     pass(true), pass(false);
 }
 
-// At each corner of blocks, the least distance of the eight about it.
+// At each corner of blocks, the least distance of the eight blocks around it.
 void clear_corners(EmptySpace& space) {
     const Index3 blocks = space.box.blocks, n = blocks + Index3(1);
     const auto count = static_cast<std::size_t>(n.x * n.y * n.z);
@@ -107,7 +107,7 @@ void clear_corners(EmptySpace& space) {
     });
 }
 
-// Each block's range with its 26 neighbours': axis by axis.
+// The range of each block and its 26 neighbours, axis by axis.
 void widen(BlockRanges& ranges) {
     const Index3 n = ranges.box.blocks;
     const auto pass = [&](std::int64_t stride, std::int64_t count) {
@@ -166,7 +166,7 @@ std::shared_ptr<const BlockRanges> block_ranges(const Volume& volume, const Bloc
 }
 
 EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, int reach, int entry_reach) {
-    // visible_before[i]: entries below i in which anything can be seen.
+    // visible_before[i]: how many entries below i can be seen.
     std::vector<int> visible_before(static_cast<std::size_t>(entries.size()) + 1, 0);
     for (std::size_t i = 0; i < entries.entry.size(); ++i)
         visible_before[i + 1] = visible_before[i] + entries.entry[i].is_visible();
@@ -177,7 +177,7 @@ EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, i
     };
     std::uint16_t greatest = 0;
     for (const std::uint16_t scalar : ranges.largest) greatest = std::max(greatest, scalar);
-    // Visible entries below those that a scalar may reach.
+    // Counts the visible entries that a range of scalars may reach.
     std::vector<int> before_from(greatest + 1U), before_to(greatest + 1U);
     for (std::size_t scalar = 0; scalar <= greatest; ++scalar) {
         const double entry = entries.coordinate(static_cast<double>(scalar));

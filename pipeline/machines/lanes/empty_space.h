@@ -1,5 +1,5 @@
 // Which parts of a volume cannot be seen: block minima and maxima once per volume, occupancy once per
-// transfer function, and for each block how far the nearest visible one is.
+// transfer function, and each block's distance to the nearest visible one.
 #pragma once
 
 #include "core/transfer_function.h"
@@ -14,7 +14,7 @@ namespace squint::lanes {
 inline constexpr int kBlockBits = 2;  // blocks of 4 x 4 x 4 cells
 inline constexpr int kBlock = 1 << kBlockBits;
 
-/// Blocks from `low`, so many along each axis.
+/// A box of blocks: from `low`, `size` along each axis.
 struct BlockBox {
     Index3 low{0, 0, 0}, blocks{0, 0, 0};
     std::int64_t count() const { return blocks.x * blocks.y * blocks.z; }
@@ -22,15 +22,15 @@ struct BlockBox {
 };
 BlockBox all_blocks_of(const Volume& volume);
 
-/// Least and greatest scalar any sample inside a block's cells can take.  Kept per volume.
+/// The least and greatest scalar of any sample in a block's cells.  Cached per volume.
 struct BlockRanges {
     BlockBox box;
     std::vector<std::uint16_t> smallest, largest;  // x fastest
 };
-/// Of these blocks at least.  Of a volume larger than memory, only what is rendered need be read.
+/// For these blocks at least.  Of a volume larger than memory only the rendered part need be read.
 std::shared_ptr<const BlockRanges> block_ranges(const Volume& volume, const BlockBox& box);
 
-/// Chebyshev distance in blocks to the nearest block in which anything can be seen; 0 there, at most 255.
+/// The Chebyshev distance in blocks to the nearest block that can be seen: 0 there, at most 255.
 struct EmptySpace {
     BlockBox box;  // no ray leaves it
     std::vector<std::uint8_t> distance;
@@ -41,12 +41,12 @@ struct EmptySpace {
         const Index3 &low = box.low, &n = box.blocks;
         return distance[static_cast<std::size_t>(((z - low.z) * n.y + y - low.y) * n.x + x - low.x)];
     }
-    /// About how many bytes the ranges and distances take of these blocks.
+    /// About how many bytes ranges and distances of these blocks take.
     static std::int64_t bytes_for(const BlockBox& box) { return 6 * box.count(); }
 };
 
-/// `reach`: blocks that two neighbouring samples may lie apart, where the method sees the range between them;
-/// 0 where it does not. `entry_reach`: entries on either side of a slab's own that its colour may come from.
+/// `reach`: how many blocks apart two neighbouring samples may be, where the method sees the range between
+/// them; else 0.  `entry_reach`: how many entries beside a slab's own its colour may depend on.
 EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, int reach,
                             int entry_reach = 0);
 

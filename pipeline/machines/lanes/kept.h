@@ -1,4 +1,4 @@
-// What is worked out once for a volume and kept while its voxels live.
+// A cache of what is computed once for a volume, kept while its voxels live.
 #pragma once
 
 #include "core/volume.h"
@@ -14,7 +14,7 @@ namespace squint::lanes {
 template <class T>
 class KeptPerVolume {
   public:
-    /// What `make` gave for these voxels the last time, unless it is not `good` any more.
+    /// What `make` returned for these voxels the last time, unless it is not `good` any more.
     template <class Make, class Good>
     std::shared_ptr<T> find(const Volume& volume, Make&& make, Good&& good) {
         const std::lock_guard lock(mutex_);
@@ -22,7 +22,7 @@ class KeptPerVolume {
         if (const auto found = kept_.find(volume.data.get());
             found != kept_.end() && found->second.dims == volume.dims && good(*found->second.thing))
             return found->second.thing;
-        // `make` may run in parallel; a thread that waits in it must not take up work that asks for this
+        // `make` may run in parallel: a thread that waits in it must not take up work that needs this
         // lock.
         const std::shared_ptr<T> thing = tbb::this_task_arena::isolate(make);
         kept_[volume.data.get()] = {volume.data, volume.dims, thing};

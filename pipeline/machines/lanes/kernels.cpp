@@ -1,4 +1,4 @@
-// First: it says which targets there are, and Highway listens once.
+// Must be included first: it selects the SIMD targets, and Highway reads that selection only once.
 #include "pipeline/machines/lanes/targets.h"
 
 #include "core/error.h"
@@ -11,7 +11,7 @@
 namespace squint::lanes {
 namespace {
 
-// Lower bits are better targets.
+// Better targets are lower bits.
 std::vector<std::int64_t> targets_here() {
     std::vector<std::int64_t> targets;
     const std::int64_t there = (hwy::SupportedTargets() | HWY_EMU128) & HWY_TARGETS;

@@ -1,4 +1,4 @@
-// Stage 4 in lanes: every method.
+// Stage 4 in lanes, for every method.
 #include "pipeline/machines/lanes/targets.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -16,7 +16,7 @@ namespace squint::HWY_NAMESPACE {
 static_assert(BlendsPairs<Lanes<std::int32_t>> && LoadsRows<Lanes<float>>,
               "lerp_rows has lost its fast ways");
 
-/// pips.h's rows by loads of whole ones.
+/// The rows of pips.h, loaded as a whole.
 template <KnownRescales K>
 HWY_INLINE std::array<std::array<Lanes<std::int32_t, K>, 4>, 2> prefix_rows(const PowerSeriesOfOrder1& m,
                                                                             Lanes<std::int32_t, K> row) {
@@ -30,7 +30,7 @@ HWY_INLINE std::array<std::array<Lanes<float, K>, 4>, 2> prefix_rows(const Power
 
 namespace {
 
-/// What a method knows of a sample: its input, for most.
+/// What a method computes of a sample: its input, for most.
 template <class M, class L>
 HWY_INLINE L sample_of(const M&, L input) {
     return input;
@@ -72,7 +72,7 @@ void classification_kernel_of(const Plan& plan, const lanes::StageWay& way, lane
     };
     std::visit(
         [&]<class M>([[maybe_unused]] const M& m) {
-            // Entries alone meet no limit; prefix sums' depths may.
+            // Entries never meet limits; depths of prefix sums may.
             constexpr KnownRescales kKnown = std::is_same_v<M, PostClassification>
                                                  ? KnownRescales::halves_up
                                                  : KnownRescales::halves_to_even;

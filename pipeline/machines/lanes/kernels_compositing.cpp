@@ -1,4 +1,4 @@
-// Stage 6 in lanes: every form.
+// Stage 6 in lanes, for every form.
 #include "pipeline/machines/lanes/targets.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -23,7 +23,7 @@ void composite_rows(const Plan& plan, const lanes::RayPacket& packet, int steps,
     CompositingStage stage = plan.compositing;
     F::assume(stage);
     const bool backwards = stage.form == CompositingForm::back_to_front;
-    // A slab without opacity changes nothing: of rays that have ended, and of rows in which nothing is seen.
+    // A slab without opacity changes nothing: those of ended rays, and rows where nothing is visible.
     const bool transparent_is_identity = !F::kNone || (plan.skips_empty_space && !stage.premultiplied);
     const L one = constant<L>(1), zero = constant<L>(0);
     for (int r = 0; r < lanes::kRays; r += static_cast<int>(L::count())) {
@@ -68,7 +68,7 @@ void composite_rows(const Plan& plan, const lanes::RayPacket& packet, int steps,
     }
 }
 
-/// Transparency alone, front to back: it does not wait for colours.
+/// Computes only the transparency, front to back, without waiting for colours.
 template <class L, class F>
 void hide_rows(const Plan& plan, const lanes::RayPacket& packet, const lanes::PixelPacket& pixels, int steps,
                lanes::Samples& samples) {
@@ -93,7 +93,7 @@ void hide_rows(const Plan& plan, const lanes::RayPacket& packet, const lanes::Pi
     }
 }
 
-/// One word a pixel from a packet, as model.h's to_double has it.
+/// One word a pixel from a packet, as to_double() of model.h has it.
 HWY_INLINE Reals values_of(bool are_floats, const lanes::Word* words) {
     const hn::Rebind<lanes::Word, Reals::D> narrow;
     const auto bits = hn::LoadU(narrow, words);

@@ -31,7 +31,7 @@ HWY_INLINE std::array<L, 3> load_three(const lanes::Batch (&from)[3], int at) {
     return {load<L>(from[0].v + at), load<L>(from[1].v + at), load<L>(from[2].v + at)};
 }
 
-/// Samples at the ends of slabs in which something is to be seen, each once.
+/// Packs the samples at the ends of visible slabs, each once.
 int gather_slab_ends(const Plan& plan, const lanes::RayPacket& rays, int steps, const Samples& s,
                      lanes::Row& known, LitSamples& ends) {
     const hn::ScalableTag<Word> d;
@@ -40,7 +40,7 @@ int gather_slab_ends(const Plan& plan, const lanes::RayPacket& rays, int steps, 
     int count = 0;
     for (int at = 0; at < (steps + 1) * kRays; at += kLanes) {
         const auto slabs = hn::Load(d, rays.slabs.v + at % kRays);
-        // Of the slab in this row, and of the one in front of it.
+        // One of the slab in this row, or of the slab in front of it.
         const auto seen = [&](int place) {
             const auto within = hn::Gt(slabs, hn::Set(d, s.first + place / kRays));
             return hn::And(hn::Gt(hn::Load(d, s.alpha.v + place), zero), within);
@@ -71,7 +71,7 @@ int gather_slab_ends(const Plan& plan, const lanes::RayPacket& rays, int steps, 
     return count;
 }
 
-/// Of `count` gathered slabs those with so many cuts; the rest up to the next sixteen repeats the last.
+/// Packs those of `count` slabs with so many cuts, and repeats the last one up to a multiple of sixteen.
 int pick_by_cuts(const Plan& plan, int count, int cuts, const LitSamples& lit, LitSamples& picked) {
     const hn::ScalableTag<Word> d;
     const ShadingStage& shading = plan.shading;
@@ -104,7 +104,7 @@ int pick_by_cuts(const Plan& plan, int count, int cuts, const LitSamples& lit, L
     return many;
 }
 
-/// Places `part` 2^-bits of the way along slabs [at, at + count), to places [to, to + count).
+/// Stores places `part` 2^-bits of the way along slabs [at, at + count) as places [to, to + count).
 template <class L>
 void place_between(const Plan& plan, const LitSamples& ends, int at, int count, int part, int bits,
                    LitSamples& places, int to) {
@@ -125,7 +125,7 @@ void place_between(const Plan& plan, const LitSamples& ends, int at, int count, 
     }
 }
 
-/// Sixteen slabs from `at` on, cut in 2^bits: row i is their part i, between its inputs and the next row's.
+/// Cuts sixteen slabs from `at` on into 2^bits: row i holds part i, between its inputs and the next row's.
 template <class L>
 void cut_sixteen(const Plan& plan, const LitSamples& slabs, int at, int bits, Samples& out) {
     const InsideStage& s = plan.inside;
@@ -144,12 +144,12 @@ void cut_sixteen(const Plan& plan, const LitSamples& slabs, int at, int bits, Sa
     }
 }
 
-/// A component of the gradients at gathered slabs' fronts, or at their backs.
+/// A component of the gradients at the fronts of packed slabs, or at their backs.
 HWY_INLINE auto end_words(const lanes::EndGradients& ends, int component, const Word* from, bool back) {
     const hn::ScalableTag<Word> d;
     return hn::GatherIndex(d, ends.component[component].v + (back ? kRays : 0), hn::Load(d, from));
 }
-/// Raw gradients of gathered slabs: what sum_of_ends is over the words of the buffers.
+/// The raw gradients of packed slabs: sum_of_ends() over the words of the buffers.
 void add_slab_ends(const Plan& plan, int count, const lanes::EndGradients& ends, LitSamples& lit) {
     const hn::ScalableTag<Word> d;
     const hn::ScalableTag<float> df;
@@ -164,7 +164,7 @@ void add_slab_ends(const Plan& plan, int count, const lanes::EndGradients& ends,
         }
 }
 
-/// log2 of the pieces of gathered slabs.
+/// log2 of the number of pieces of packed slabs.
 template <class L>
 void find_cuts(const Plan& plan, int count, const lanes::EndGradients& ends, LitSamples& lit) {
     const hn::ScalableTag<Word> d;
@@ -187,7 +187,7 @@ void find_cuts(const Plan& plan, int count, const lanes::EndGradients& ends, Lit
     }
 }
 
-/// Sixteen slabs' lit pieces, piece i in row i, to their straight colours in `slabs` from `at` on.
+/// Joins the lit pieces of sixteen slabs, piece i in row i, to straight colours in `slabs` from `at` on.
 template <class L>
 void join_sixteen(const Plan& plan, const LitSamples& pieces, int bits, LitSamples& slabs, int at) {
     for (int r = 0; r < kRays; r += static_cast<int>(L::count())) {

@@ -1,4 +1,4 @@
-// MIP, MinIP and average in lanes: the samples of a ray onto the one scalar that stands for it.
+// MIP, MinIP and average in lanes: adds a ray's samples to the one scalar that represents it.
 #include "pipeline/machines/lanes/targets.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -32,7 +32,7 @@ void extreme_of_rows(const lanes::RayPacket& packet, int steps, const lanes::Sam
     }
 }
 
-/// 16 million sums of two inputs of 31 bits, as many as a ray may have, fit 64 bits.
+/// A ray has at most 16 million slabs; that many sums of two inputs of 31 bits fit 64 bits.
 void sum_of_rows(const lanes::RayPacket& packet, int steps, const lanes::Samples& samples,
                  lanes::ProjectionPacket& projection) {
     using L = Lanes<std::int64_t>;

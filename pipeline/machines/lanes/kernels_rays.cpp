@@ -1,4 +1,4 @@
-// Rays in lanes: sixteen of them set up, and about where they run.
+// Rays in lanes: sets up sixteen, and computes about where they run.
 #include "pipeline/machines/lanes/targets.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -65,12 +65,12 @@ constexpr float float_power(int bits) {
     return std::bit_cast<float>((bits + 127) << 23);
 }
 
-/// The group of 2x2 pixels that ray r of a packet belongs to.
+/// The group of 2x2 pixels to which ray r of a packet belongs.
 constexpr int beam_of(int r) {
     return r % lanes::kSide / 2 + r / lanes::kSide / 2 * 2;
 }
 
-/// Along a course, the largest distance over the axes of any ray of a beam from it: at one of its ends, for
+/// Along a course, the largest distance over the axes from it to any ray of a beam: it is at an end, because
 /// both are straight.
 float farthest_off(const lanes::RayPacket& rays, const float (*first)[kRays], const float (*step)[kRays],
                    const lanes::RayCourse& course) {
@@ -115,7 +115,7 @@ void set_course(const Plan& plan, const lanes::EmptySpace& empty, const lanes::R
             hn::Store(hn::Sub(p, hn::Set(df, static_cast<float>(low[a]))), df, first[a] + r);
             hn::Store(hn::Mul(value_at(rays.step[a].v + r), step_unit), df, step[a] + r);
         }
-    // Between the first and the last ray of each beam.
+    // Midway between the first and the last ray of each beam.
     const auto set_beams = [&](int beams) {
         int one[RayCourse::kMostBeams], other[RayCourse::kMostBeams];
         std::fill_n(one, beams, -1);
@@ -136,8 +136,8 @@ void set_course(const Plan& plan, const lanes::EmptySpace& empty, const lanes::R
         }
         return farthest_off(rays, first, step, course);
     };
-    // A location is rounded once, by a last bit at most; the last stands at its exit, off P0 + kV by what
-    // rounding V adds up to; floats add their own error.
+    // A location is rounded once, by at most a last bit; the last one lies at its exit, off P0 + kV by the
+    // sum of V's roundings; floats add errors of their own.
     const float margin = (float_power(-stage.location_fraction) + static_cast<float>(stage.drift()) +
                           static_cast<float>(std::max({n.x, n.y, n.z})) * 0x1p-20F + 0x1p-10F) /
                          lanes::kBlock;

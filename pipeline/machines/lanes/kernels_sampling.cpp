@@ -23,11 +23,11 @@ using lanes::kRays;
 template <class L, bool kKeepsLocation, class TakeCell>
 HWY_INLINE void locate_into(const Plan& plan, const lanes::RayPacket& packet, int from, int to,
                             lanes::Samples& out, const TakeCell& take_cell) {
-    const LocationStage stage = plan.location;  // a copy: nothing stored can change it
+    const LocationStage stage = plan.location;  // a copy: no store can change it
     const L full = constant<L>(std::int64_t{1} << stage.length_fraction);
     for (int r = 0; r < kRays; r += static_cast<int>(L::count())) {
         RayWords<L> ray;
-        // P0 + kV by adding V: exact, so the same, but for floats.
+        // P0 + kV by adding V: exact, hence the same, except in floats.
         std::array<L, 3> exact, strides, location;
         ray.last_index = load_whole<L>(packet.last_index.v + r);
         const L start = constant<L>(out.first + from);
@@ -50,7 +50,7 @@ HWY_INLINE void locate_into(const Plan& plan, const lanes::RayPacket& packet, in
             take_cell(at, position.cell);
         };
         if constexpr (!RealWord<L>) {
-            // A batch that ends before any ray's last slab, its two ends inside the box: nothing is clamped.
+            // A batch that ends before any ray's last slab, both ends inside the box: nothing is clamped.
             const L rows = constant<L>(to - from - 1);
             auto leaves = (constant<L>(0) < slabs) & !(constant<L>(out.first + to - 1) < last_slab);
             for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
@@ -104,7 +104,7 @@ void step_rows_aside(const Plan& plan, const lanes::LitSamples& lit, int axis, b
     for (int at = 0; at < rows * kRays; at += static_cast<int>(L::count())) {
         std::array<L, 3> location;
         for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
-            // Behind the last sample stands anything.
+            // Lanes past the last sample hold garbage: clamp them, so that the fetch stays in bounds.
             location[a] =
                 clamp(load<L>(lit.location[0][a].v + at), constant<L>(0), constant<L>(stage.limit[a]));
         });
@@ -118,7 +118,7 @@ void step_rows_aside(const Plan& plan, const lanes::LitSamples& lit, int axis, b
     }
 }
 
-/// A cell as it is fetched: two corners a word.
+/// A cell as fetched: two corners a word.
 template <class L, bool kBelow15Bits>
 struct PackedCell {
     std::array<L, 4> pair;
@@ -154,7 +154,7 @@ void interpolate_scalar_rows(const Plan& plan, int from, int to, lanes::Samples&
         store(stored_sample<L, kBelow15Bits>(stage, samples, at), samples.input.v + at);
 }
 
-/// I: the lanes of the way from a sample to table entries, no narrower than L.
+/// I: the lanes from a sample to table entries, no narrower than L.
 template <class L, class I, bool kBelow15Bits>
 void interpolate_rows(const Plan& plan, int from, int to, lanes::Samples& samples) {
     const InterpolationStage stage = plan.interpolation;

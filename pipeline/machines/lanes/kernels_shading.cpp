@@ -1,4 +1,4 @@
-// Stages 3 and 5 in lanes, over the samples that a light falls on.
+// Stages 3 and 5 in lanes, over samples that light falls on.
 #include "pipeline/machines/lanes/targets.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -24,7 +24,7 @@ template <class L, bool kNarrow>
 struct StoredNeighbourhood {
     const lanes::Batch* pair;
     int place;
-    bool cross;  // LitSamples::pair
+    bool cross;  // see LitSamples::pair
     L at(int x, int y, int z) const {
         if (cross && lanes::is_outer_row(y, z)) return half_of(words(0, y, z), x == 2);
         return half_of(words(x / 2, y, z), x % 2 != 0);
@@ -82,9 +82,9 @@ HWY_INLINE std::array<L, 3> stored_gradient(const GradientStage& s, const lanes:
     return {along(0), along(1), along(2)};
 }
 
-/// Stage 3's first half: raw gradients, as 32-bit words.  G: lanes whose lerps may need to be wider than all
-/// that follows.  Loops apart, for each vector's way through them is one long chain: in a loop of its own the
-/// next vectors' run beside it.
+/// The first half of stage 3: raw gradients, as 32-bit words.  G: lanes whose lerps may need to be wider than
+/// what follows.  It has a loop of its own because each vector is one long chain of operations: there, the
+/// chains of several vectors overlap.
 template <class G, class F>
 void find_gradients(const Plan& plan, int count, lanes::LitSamples& lit) {
     GradientStage stage = plan.gradient;
@@ -95,7 +95,7 @@ void find_gradients(const Plan& plan, int count, lanes::LitSamples& lit) {
     }
 }
 
-/// Its second half: normals.
+/// The second half of stage 3: normals.
 template <class L, class F>
 void find_normals(const Plan& plan, int count, lanes::LitSamples& lit) {
     GradientStage stage = plan.gradient;

@@ -1,5 +1,5 @@
-// Between stages 1 and 2: where samples' voxels lie, and their way into registers.  And what of a ray need
-// not be sampled at all.
+// Between stages 1 and 2: finds samples' voxels and loads them into registers.  Also decides which parts of a
+// ray need no samples.
 #include "pipeline/machines/lanes/targets.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -42,7 +42,7 @@ HWY_INLINE Word pair_at(const std::uint8_t* voxels) {
 
 // ------------------------------------------------------------------------------- the volume itself
 
-/// kNumbered: the number of any voxel fits a word; the cells' lowest corners are numbered in `place`.
+/// kNumbered: the index of any voxel fits a word, and `place` holds those of the cells' lowest corners.
 template <class T, bool kNumbered>
 void prefetch_linear(const VoxelSource& source, int from, int to, Samples& s) {
     const Volume& volume = *source.volume;
@@ -57,7 +57,7 @@ void prefetch_linear(const VoxelSource& source, int from, int to, Samples& s) {
             hn::Store(hn::Add(hn::Load(d, s.cell[0].v + at), hn::Add(y, z)), d, s.place.v + at);
         }
     }
-    // Every second step will do, for neighbours share cache lines.
+    // Every second step suffices, because neighbours share cache lines.
     for (int i = from * kRays; i < to * kRays; i += 2 * kRays)
         for (const int ray : kOutermost) {
             const T* corner = corner_of<T>(volume, s, i + ray);
@@ -117,7 +117,7 @@ int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, int steps
         const auto wanted = hn::And(hn::Gt(hn::Load(d, s.alpha.v + at), zero), within);
         if (hn::AllFalse(d, wanted)) continue;
         const Packing packing(wanted);
-        // Whole vectors are stored; what lies behind the last sample is written over by the next.
+        // Stores whole vectors; the next store overwrites what follows the last sample.
         const auto pack = [&](const Word* from, lanes::Batch& to) {
             packing(hn::Load(d, from), to.v + count);
         };
@@ -145,15 +145,15 @@ int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, int steps
     return count;
 }
 
-// Rows of four voxels a gradient wants, of the 4x4 about a cell: bit z * 4 + y.
+// The rows of four voxels that a gradient needs, of the 4x4 around a cell: bit z * 4 + y.
 constexpr unsigned rows_of(GradientRule rule) {
     return rule == GradientRule::analytic ? 0x0660U : rule == GradientRule::central ? 0x6ff6U : 0xffffU;
 }
 
 using Words = hn::Vec<hn::ScalableTag<Word>>;
 
-/// Four voxels along x at each lane's element of a row, as two words of pairs, or the middle two of them: by
-/// gathers.
+/// Gathers four voxels along x at each lane's element of a row, as two words of pairs, or as their middle
+/// pair.
 #if HWY_TARGET != HWY_SCALAR
 constexpr bool kGathersRows = true;
 HWY_INLINE Words spread_bytes(Words two) {
@@ -220,7 +220,7 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
             outside = hn::Or(outside, hn::Or(hn::Lt(p, hn::Set(d, 1)),
                                              hn::Gt(p, hn::Set(d, static_cast<Word>(n[a] - 3)))));
         }
-        const int here = std::min(kLanes, count - at);  // lanes behind the last sample repeat the first
+        const int here = std::min(kLanes, count - at);  // lanes past the last sample repeat the first
         outside = hn::And(outside, hn::FirstN(d, static_cast<std::size_t>(here)));
         if (hn::AllFalse(d, outside)) {
             if (kGathersRows && offsets_fit) {
@@ -228,7 +228,7 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
                 for (const int a : {1, 0})
                     first = hn::Add(hn::Mul(first, hn::Set(d, static_cast<Word>(n[a]))),
                                     hn::Sub(hn::Load(d, cell[a].v + at), hn::Set(d, 1)));
-                // Lanes behind the last sample look at the first voxel.
+                // Lanes past the last sample read the first voxel.
                 first = hn::IfThenElseZero(hn::FirstN(d, static_cast<std::size_t>(here)), first);
                 for (int row = 0; row < 16; ++row) {
                     if (!(rows >> row & 1)) continue;
@@ -282,7 +282,7 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
 
 // ------------------------------------------------------------------------------------- empty space
 
-/// Bit i of the answer: whether something may be seen about some beam at row `at[i]`, i < kWindow.
+/// Bit i of the result: whether something may be visible around a beam at row `at[i]`, i < kWindow.
 template <class At>
 std::uint32_t seen_about(const lanes::EmptySpace& empty, const lanes::RayCourse& course, int enough,
                          At&& at) {
@@ -341,7 +341,7 @@ lanes::Rows visible_rows_of(const lanes::EmptySpace& empty, const lanes::RayPack
             k += skipped;
             continue;
         }
-        // A wide gap, perhaps.
+        // Perhaps a wide gap.
         k = course.window + kWindow;
         const auto n = static_cast<float>(course.stride);
         for (std::uint32_t seen = 0; seen == 0 && k < rays.most_slabs;) {

@@ -22,15 +22,15 @@ namespace {
 
 using namespace squint::HWY_NAMESPACE;
 
-// Bits of the lanes that hold a stage; 0 where none does.
+// The bits of the lanes that hold a stage; 0 if none do.
 int bits_of(const WordNeeds& needs) {
-    constexpr int kBitsOfDouble = 54;  // with a sign: what 32-bit lanes have for wide numbers
+    constexpr int kBitsOfDouble = 54;  // sign included: what 32-bit lanes have for wide numbers
     if (needs.operand_bits > 32) return 0;
     if (needs.lane_bits <= 32 && needs.wide_bits <= kBitsOfDouble) return 32;
     return std::max(needs.lane_bits, needs.wide_bits) <= 64 ? 64 : 0;
 }
 
-// The most that is known of a stage's roundings, in 32-bit lanes.
+// The strongest assumption that a stage's roundings allow, in 32-bit lanes.
 struct KnownOf {
     KnownRescales known = KnownRescales::halves_up;
     void operator()(const Rescale& to) {
@@ -49,20 +49,20 @@ KnownRescales known_of(Stage... stage) {
     return all.known;
 }
 
-// How far samples may leave the box that is rendered, in voxels.
+// How far samples may leave the rendered box, in voxels.
 double drift_of(const Plan& plan) {
     const Index3& n = plan.volume->dims;
     const double of_floats = plan.float32 ? static_cast<double>(std::max({n.x, n.y, n.z})) * 0x1p-20 : 0;
     return of_floats + plan.location.drift();
 }
 
-// Blocks that a slab's two ends may lie apart; 0 where one sample classifies it.
+// How many blocks apart a slab's ends may be; 0 where one sample classifies it.
 int slab_reach(const Plan& plan) {
     if (!plan.samples_both_ends()) return 0;
     return static_cast<int>(std::ceil(std::min((plan.scene.sampling.step + drift_of(plan)) / kBlock, 1e6)));
 }
 
-// Blocks that samples may lie in, and as many about them as a slab reaches, and one more.
+// The blocks that samples may lie in, with a margin of a slab's reach and one more.
 BlockBox blocks_met(const Plan& plan) {
     const Volume& volume = *plan.volume;
     const BlockBox all = all_blocks_of(volume);
@@ -80,8 +80,8 @@ BlockBox blocks_met(const Plan& plan) {
     return box;
 }
 
-// Whether rays may meet a block of cells.  Those that leave out empty space still run through what lies
-// within a batch of something visible.
+// Whether rays may meet a block of cells.  Rays that skip empty space still run through what lies within a
+// batch of something visible.
 bool may_be_met(const BlockBox& box, const EmptySpace* empty, const Index3& cell_blocks, std::int64_t block) {
     constexpr int kBits = CellBlocks::kBits - kBlockBits;
     static_assert(kBits >= 0);
@@ -122,7 +122,7 @@ bool rays_lie_apart(const Plan& plan) {
     return (kSide - 1) * pitch > kVoxels * plan.volume->smallest_spacing();
 }
 
-// Whether a pixel that has gathered nothing is black and clear to the last bit.
+// Whether a pixel that gathered nothing is black and transparent to the last bit.
 bool nothing_is_black(const Plan& plan) {
     const auto black = [&](const auto& nothing) {
         const std::array<double, 4> color = color_of(
@@ -135,7 +135,7 @@ bool nothing_is_black(const Plan& plan) {
                         : black(nothing_yet<std::int64_t>(plan.compositing));
 }
 
-// Builds the cells that rays may meet, unless the last call for this volume asked for the same ones.
+// Builds the cells that rays may meet, unless the last call for this volume asked for the same.
 void build_cells(const std::shared_ptr<CellBlocks>& cells, const Volume& volume, const BlockBox& box,
                  const std::shared_ptr<const EmptySpace>& empty) {
     struct Built {
@@ -157,7 +157,7 @@ void build_cells(const std::shared_ptr<CellBlocks>& cells, const Volume& volume,
         });
 }
 
-// What the system could give: pages of mapped files make way.
+// The memory that the system could give: pages of mapped files make way.
 std::int64_t free_memory() {
     std::ifstream file("/proc/meminfo");
     for (std::string word; file >> word;)
@@ -239,7 +239,7 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
     };
     for (const Wire wire : stored)
         if (const auto obstacle = most_bits(wire, 31)) return obstacle;
-    if (plan.lit)  // sums of a slab's ends have a bit more
+    if (plan.lit)  // the sum of a slab's two ends has one more bit
         if (const auto obstacle = most_bits(Wire::gradient, plan.shares_ends() ? 30 : 31)) return obstacle;
     return std::nullopt;
 }
@@ -258,7 +258,7 @@ LaneRenderer::LaneRenderer(const Plan& plan, const RenderOptions& options)
 }
 
 void LaneRenderer::find_empty() {
-    constexpr int kMostReach = 4;  // with longer slabs little is left out
+    constexpr int kMostReach = 4;  // longer slabs skip little
     if (slab_reach(plan_) > kMostReach) return;
     const BlockBox box = blocks_met(plan_);
     if (EmptySpace::bytes_for(box) > room_) {
@@ -341,7 +341,7 @@ void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& 
                                TileStatistics& statistics) const {
     const auto workspace = std::make_unique_for_overwrite<Workspace>();
     Workspace& w = *workspace;
-    if (plan_.lit) w.lit = {};  // lanes behind the last gathered sample are computed, too
+    if (plan_.lit) w.lit = {};  // lanes past the last packed sample are computed, too
     if (plan_.shares_ends()) w.ends = {}, w.end_gradients = {};
     if (plan_.inside.rule == InsideRule::adaptive) w.picked = w.pieces = {}, w.cut = {};
     PacketLoop loop(plan_, kernels_, schedule_, voxels_, empty_.get(), w);

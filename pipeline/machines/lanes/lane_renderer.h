@@ -1,5 +1,5 @@
-// The fast path: packets of 16 rays through the stages' kernels, batch after batch.  Bit for bit what the
-// model gives.
+// The fast path: packets of 16 rays go through the stages' kernels, batch after batch.  It gives the model's
+// bits.
 #pragma once
 
 #include "core/image.h"
@@ -16,7 +16,7 @@
 
 namespace squint::lanes {
 
-/// What keeps a plan from the lanes, in one line; none when they can run it.
+/// Why lanes cannot run a plan, in a line; empty if they can.
 std::optional<std::string> what_needs_the_model(const Plan& plan);
 
 /// The words of a plan that they can run, and its schedule: the kernel of each segment, and why no faster one
@@ -25,10 +25,10 @@ std::string words_in_lanes(const Plan& plan);
 
 class LaneRenderer {
   public:
-    /// Throws InputError for a target this machine lacks.
+    /// Throws InputError for a target that this machine lacks.
     LaneRenderer(const Plan& plan, const RenderOptions& options);
 
-    /// As ModelRenderer::render_tile.
+    /// Like ModelRenderer::render_tile.
     void render_tile(int left, int top, int right, int bottom, Image& image,
                      TileStatistics& statistics) const;
 
@@ -53,7 +53,7 @@ class LaneRenderer {
     CountSlabs count_slabs_;
     std::shared_ptr<CellBlocks> cells_;
     bool no_room_to_skip_ = false;
-    std::int64_t room_ = 0;  // bytes for what stands beside the volume
+    std::int64_t room_ = 0;  // bytes for layouts beside the volume
     VoxelSource voxels_;
     std::string layout_;
 };

@@ -1,4 +1,4 @@
-// One packet of 16 rays, batch after batch through the stages' kernels.  For lane_renderer.cpp alone.
+// Takes one packet of 16 rays, batch after batch, through the stages' kernels.  Only for lane_renderer.cpp.
 #pragma once
 
 #include "pipeline/machines/aovs.h"
@@ -18,7 +18,7 @@ namespace squint::lanes {
 
 using namespace squint::HWY_NAMESPACE;
 
-// A word in the buffers: an integer, or a float's bits.
+// A word in the buffers: an integer, or the bits of a float.
 inline Word bits_of(std::int64_t word) {
     return static_cast<Word>(word);
 }
@@ -36,32 +36,32 @@ inline bool any_active(const PixelPacket& pixels) {
     return std::any_of(std::begin(pixels.active.v), std::end(pixels.active.v), [](Word a) { return a != 0; });
 }
 
-// What depth and normals are made of: touched only where a scene asks for them.
+// What depth and normals need: touched only where a scene asks for them.
 struct Notes {
     Batch between;                     // T at the ends of a batch's slabs
     Row samples_before;                // of the batch
-    Batch in_pieces, normal[3];        // where a slab was lit so, and its first visible piece's
+    Batch in_pieces, normal[3];        // which slabs were lit in pieces; normal of the first visible piece
     Pixel<std::int64_t> pixel[kRays];  // depths, and the first visible slab's normal
     bool met[kRays];                   // something lit, and so visible
 };
 
-// One packet's buffers: about 60 KiB, most of it touched only where light falls.
+// The buffers of one packet: about 60 KiB, most of them touched only where light falls.
 struct Workspace {
     RayPacket rays;
     RayCourse course;
     PixelPacket pixels;
     ProjectionPacket projection;
-    Samples samples[2];  // this batch, and the next one's locations
+    Samples samples[2];  // this batch's, and the next one's locations
     LitSamples lit;
-    LitSamples ends;  // of slabs that are lit by the gradients there
+    LitSamples ends;  // ends of slabs that are lit by the gradients there
     EndGradients end_gradients;
-    LitSamples picked, pieces;  // slabs that are lit in one number of pieces, and those
+    LitSamples picked, pieces;  // slabs lit in one number of pieces, and these pieces
     Samples cut;
-    Samples beside;  // those that a gradient is made of
+    Samples beside;  // neighbours that a gradient is computed from
     Notes notes;
 };
 
-/// Ray r's pixel, with what has been noted of it.
+/// The pixel of ray r, with its depths and normal.
 template <class W>
 Pixel<W> finished(const PixelPacket& pixels, int r, Pixel<W> pixel = {}) {
     for (std::size_t c = 0; c < 3; ++c) word_from_bits(pixels.color[c].v[r], pixel.gathered.color[c]);
@@ -83,7 +83,7 @@ class PacketLoop {
           backwards_(plan.compositing.form == CompositingForm::back_to_front && !plan.projection_mode),
           notes_((plan.wants_depth || plan.scene.output.normals) && !plan.projection_mode) {}
 
-    /// All slabs of a packet whose rays are set up.
+    /// Casts all slabs of a packet whose rays are set up.
     void run() {
         located_ = -1, visited_ = 0;
         start_pixels();
@@ -98,7 +98,7 @@ class PacketLoop {
             run_forwards();
     }
 
-    /// Ray r's pixel.
+    /// The pixel of ray r.
     Pixel<std::int64_t> pixel(int r) const {
         if (plan_.projection_mode && w_.rays.slabs.v[r] > 0)
             return project_pixel(
@@ -108,12 +108,12 @@ class PacketLoop {
         return finished<std::int64_t>(w_.pixels, r, notes_ ? w_.notes.pixel[r] : Pixel<std::int64_t>{});
     }
 
-    /// Slabs composited, or projected; a ray outside the tile has none.
+    /// Slabs composited or projected; a ray outside the tile has none.
     std::int64_t samples() const {
         const Row& counted = plan_.projection_mode ? w_.rays.slabs : w_.pixels.samples;
         return std::accumulate(std::begin(counted.v), std::end(counted.v), std::int64_t{0});
     }
-    /// Slabs of the packet, of all its rays, that went through the stages.
+    /// Slabs of all rays of the packet that went through the stages.
     std::int64_t visited() const { return visited_; }
 
   private:
@@ -143,7 +143,7 @@ class PacketLoop {
     void run_forwards() {
         Rows rows = next_rows(0);
         kernels_.pass_over(w_.rays, 0, rows.first, w_.pixels);
-        bool carried = false;  // the sample behind the last slab is known: the next batch's row 0
+        bool carried = false;  // the sample behind the last slab is known and becomes row 0 of the next batch
         while (rows.count > 0) {
             const Rows next = next_rows(rows.end());
             batch(rows, next, carried);
@@ -161,7 +161,7 @@ class PacketLoop {
         }
     }
 
-    // Slabs between a batch and the next composite nothing; they count as composited, as in the model.
+    // Slabs between two batches composite nothing, but count as composited, as in the model.
     Rows next_rows(int k) {
         if (empty_) return kernels_.visible_rows(*empty_, w_.rays, k, w_.course);
         return {k, std::min(kSteps, w_.rays.most_slabs - k)};
@@ -246,7 +246,7 @@ class PacketLoop {
         if (notes_) note(lit_);
     }
 
-    // One batch's last row becomes the next one's first.
+    // The last row of one batch becomes the first of the next.
     void carry(const Samples& from, Samples& to) const {
         const auto move = [this](const Batch& a, Batch& b) {
             std::memmove(b.v, a.v + last_count_ * kRays, sizeof(Word) * kRays);
@@ -258,7 +258,7 @@ class PacketLoop {
             if (plan_.shares_ends()) move(end, end);
     }
 
-    // Gathers what is visible and not yet hidden, lights it, and puts it back.  Gives its number.
+    // Packs what is visible and not hidden, lights it, and puts it back.  Returns its number.
     int light(int steps) {
         Samples& s = here();
         LitSamples& lit = w_.lit;
@@ -278,7 +278,7 @@ class PacketLoop {
         return count;
     }
 
-    // Stage 3's first half at gathered places.
+    // The first half of stage 3, at packed places.
     void find_gradients(int count, LitSamples& lit) {
         look_around(count, lit);
         kernels_.find_gradients(plan_, count, lit);
@@ -288,7 +288,7 @@ class PacketLoop {
         kernels_.find_normals(plan_, count, lit);
         kernels_.shade(plan_, count, lit);
     }
-    // The gradients at the ends of slabs to be lit, each computed once for both slabs beside it.
+    // The gradients at the ends of slabs to be lit; two neighbouring slabs share one.
     void find_end_gradients(int steps) {
         const int ends = kernels_.gather_ends(plan_, w_.rays, steps, here(), w_.end_gradients.known, w_.ends);
         if (ends == 0) return;
@@ -303,7 +303,7 @@ class PacketLoop {
             for (int c = 0; c < 3; ++c) s.color[c].v[lit.from.v[i]] = lit.color[c].v[i];
     }
 
-    // Those that turn, once more, in 2 or 4 pieces.
+    // Slabs that turn are lit again, in 2 or 4 pieces.
     void light_as_it_turns(int count) {
         kernels_.find_cuts(plan_, count, w_.end_gradients, w_.lit);
         for (int bits = 1; bits <= kMostCuts; ++bits) {
@@ -334,7 +334,7 @@ class PacketLoop {
         if (notes_) note_pieces(at, bits);
     }
 
-    // A slab's normal is that of its first piece that is seen.
+    // The normal of a slab is that of its first visible piece.
     void note_pieces(int at, int bits) {
         for (int r = 0; r < kRays; ++r) {
             int piece = 0;
@@ -358,7 +358,7 @@ class PacketLoop {
                               : twice(std::int64_t{}, lit.gradient[a].v[i]);
     }
 
-    // What the gradients of the first `count` gathered places are made of: voxels, or the six samples about
+    // Fetches what the gradients of the first `count` packed places need: voxels, or the six samples around
     // each place.
     void look_around(int count, LitSamples& lit) {
         if (!plan_.gradient_from_samples()) return kernels_.fetch_lit(plan_, count, lit);
@@ -373,14 +373,14 @@ class PacketLoop {
             }
     }
 
-    // Depths and first normals of the batch that has just been composited, `lit` samples of it lit.  A ray
-    // took its first slabs, so many as it has more `samples` than before.
+    // Adds the depths and first normals of a batch just composited, of which `lit` samples were lit.  A ray
+    // composited as many slabs of this batch as its `samples` count grew.
     void note(int lit) {
         int taken[kRays];
         for (int r = 0; r < kRays; ++r) taken[r] = w_.pixels.samples.v[r] - w_.notes.samples_before.v[r];
         for (int r = 0; plan_.wants_depth && r < kRays; ++r) note_depths(r, taken[r]);
         for (int i = 0; plan_.scene.output.normals && i < lit; ++i) {
-            const int place = backwards_ ? lit - 1 - i : i;  // as the ray meets them
+            const int place = backwards_ ? lit - 1 - i : i;  // in the order in which the ray meets them
             const int at = w_.lit.from.v[place], r = at % kRays;
             if (at / kRays >= taken[r] || (w_.notes.met[r] && !backwards_)) continue;
             const bool in_pieces = w_.notes.in_pieces.v[at] != 0;
@@ -417,7 +417,7 @@ class PacketLoop {
     bool notes_;   // depth or normals are asked for
     int lit_ = 0;  // slabs of the batch at hand
     int current_ = 0;
-    int located_ = -1;    // first slab of the batch whose locations stand in the other buffer
+    int located_ = -1;    // first slab of the batch whose locations are in the other buffer
     int last_count_ = 0;  // slabs of the last batch
     std::int64_t visited_ = 0;
 };

@@ -1,4 +1,4 @@
-// A packet's rays, as many as doubles stand side by side.
+// Sets up the rays of a packet, as many at once as a vector has doubles.
 #if defined(SQUINT_PIPELINE_MACHINES_LANES_PACKET_RAYS_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SQUINT_PIPELINE_MACHINES_LANES_PACKET_RAYS_INL_H
 #undef SQUINT_PIPELINE_MACHINES_LANES_PACKET_RAYS_INL_H
@@ -13,7 +13,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
-/// Rays r, r + 1, ... of a packet; those that lie outside the tile have no slabs.
+/// Rays r, r + 1, ... of a packet; rays outside the tile have no slabs.
 HWY_INLINE RaySetupOf<Reals> set_up_packet_rays(const Plan& plan, const lanes::PacketPlace& place, int r) {
     alignas(64) static constexpr double kColumn[lanes::kRays] = {0, 1, 2, 3, 0, 1, 2, 3,
                                                                  0, 1, 2, 3, 0, 1, 2, 3};

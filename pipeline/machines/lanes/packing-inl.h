@@ -1,4 +1,4 @@
-// The lanes that are wanted, side by side: of many vectors alike.  Compiled once per SIMD target.
+// Packs the wanted lanes of several vectors side by side.  Compiled once per SIMD target.
 #if defined(SQUINT_PIPELINE_MACHINES_LANES_PACKING_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SQUINT_PIPELINE_MACHINES_LANES_PACKING_INL_H
 #undef SQUINT_PIPELINE_MACHINES_LANES_PACKING_INL_H
@@ -13,7 +13,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
-/// Where lanes go, worked out once: g++ 12 copies the table behind Highway's Compress at every use.
+/// The order of lanes, computed once: g++ 12 copies the table behind Highway's Compress at every use.
 class Packing {
     using D = hwy::HWY_NAMESPACE::ScalableTag<lanes::Word>;
 
@@ -23,7 +23,7 @@ class Packing {
         : count_(static_cast<int>(hwy::HWY_NAMESPACE::CountTrue(D(), wanted))),
           from_(order_of(wanted, count_)) {}
     int count() const { return count_; }
-    /// Stores the wanted words, and after them others up to a vector's end.
+    /// Stores the wanted words, and after them other words up to a vector's end.
     template <class V>
     HWY_INLINE void operator()(V words, lanes::Word* to) const {
         hwy::HWY_NAMESPACE::StoreU(hwy::HWY_NAMESPACE::TableLookupLanes(words, from_), D(), to);

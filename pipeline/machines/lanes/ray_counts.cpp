@@ -1,4 +1,4 @@
-// Rays in lanes, counted: of packets that look at nothing.
+// Counts rays and slabs in lanes, for packets that look at nothing.
 #include "pipeline/machines/lanes/targets.h"
 
 #undef HWY_TARGET_INCLUDE

@@ -1,4 +1,4 @@
-// Rays and their slabs, counted without being cast.
+// Counts rays and their slabs without casting them.
 #pragma once
 
 #include "pipeline/machines/lanes/packet.h"
@@ -8,12 +8,12 @@
 
 namespace squint::lanes {
 
-/// Rays that meet the volume, and their slabs.
+/// The number of rays that meet the volume, and of their slabs.
 struct RayCounts {
     std::int64_t rays = 0, slabs = 0;
 };
 using CountSlabs = RayCounts (*)(const Plan&, const PacketPlace&);
-/// Counts what set_up would of a packet, on a SIMD target (kernels.h).
+/// Counts what set_up would find for a packet, on a SIMD target (kernels.h).
 CountSlabs slab_counter(std::int64_t target);
 
 }  // namespace squint::lanes

@@ -18,19 +18,19 @@ struct Bounds {
     double low, high;
 };
 
-// What x . axis can be, for x in the box less `from`.
+// The range of x . axis for x in the box minus `from`.
 Bounds along(const GridBox& box, const Vec3& from, const Vec3& axis) {
     const double middle = (box.middle - from).dot(axis);
     const double reach =
         std::abs(axis.x) * box.half.x + std::abs(axis.y) * box.half.y + std::abs(axis.z) * box.half.z;
     return {middle - reach, middle + reach};
 }
-// Of a quotient with depths above zero.
+// The range of a quotient by depths above zero.
 Bounds over(const Bounds& x, const Bounds& depth) {
     return {x.low / (x.low < 0 ? depth.low : depth.high), x.high / (x.high < 0 ? depth.high : depth.low)};
 }
 
-// Marks a box's rectangle on the screen; false where it has none, for it reaches behind the eye.
+// Marks a box's rectangle on the screen; returns false for a box that reaches behind the eye.
 bool mark_box(const Camera& camera, const GridBox& box, ScreenMask& mask) {
     Bounds across = along(box, camera.eye, camera.right), above = along(box, camera.eye, camera.up);
     if (camera.projection == Projection::perspective) {
@@ -38,7 +38,7 @@ bool mark_box(const Camera& camera, const GridBox& box, ScreenMask& mask) {
         if (depth.low < 1e-6 * depth.high || !(depth.low > 0)) return false;
         across = over(across, depth), above = over(above, depth);
     }
-    // ray_through (core/rays-inl.h) solved for the column and the row; a hundredth of a pixel for roundings.
+    // Solves ray_through (core/rays-inl.h) for column and row; a hundredth of a pixel for roundings.
     constexpr double kMore = 0.01;
     const double pixels = camera.height / (2 * camera.half_height);
     const double middle_column = 0.5 * (camera.width - 1), middle_row = 0.5 * (camera.height - 1);
@@ -82,7 +82,7 @@ ScreenMask visible_packets(const Plan& plan, const EmptySpace& empty) {
     ScreenMask mask(plan.camera.width, plan.camera.height);
     const Volume& volume = *plan.volume;
     const Index3 &low = empty.box.low, &n = empty.box.blocks;
-    // A sample stands off its ray by its rounding, by what rounding V adds up to, and (floats) by their own.
+    // A sample is off its ray by its rounding, the sum of V's roundings and, for floats, their own errors.
     const double off =
         std::ldexp(1.0, -plan.location.location_fraction) + plan.location.drift() +
         static_cast<double>(std::max({volume.dims.x, volume.dims.y, volume.dims.z})) * 0x1p-20 + 0x1p-10;

@@ -1,4 +1,4 @@
-// Which packets of a picture look at anything: the others are filled, not cast.
+// Which packets of a picture can see anything: the others are filled, not cast.
 #pragma once
 
 #include "pipeline/machines/lanes/empty_space.h"
@@ -12,18 +12,18 @@
 
 namespace squint::lanes {
 
-/// A mark for every 4x4 pixels of a picture, from its corner on, whose rays may meet a visible block.
+/// A mark for each 4x4 pixels of a picture, from its corner on, whose rays may meet a visible block.
 class ScreenMask {
   public:
-    /// Every packet is marked.
+    /// Marks every packet.
     ScreenMask() = default;
-    /// Nothing is marked yet.
+    /// Marks nothing.
     ScreenMask(int width, int height);
 
-    /// Pixels [left, right) x [top, bottom), both ends held inside the picture; from many threads at once.
+    /// Marks pixels [left, right) x [top, bottom), clamped to the picture; many threads may call it at once.
     void mark(double left, double top, double right, double bottom);
-    /// Whether any of the 4x4 pixels from (left, top) is marked, wherever they start: they lie in as many as four
-    /// of the mask's own packets.
+    /// Whether any of the 4x4 pixels from (left, top) on is marked, wherever they start: they overlap up to
+    /// four of the mask's packets.
     bool holds(int left, int top) const {
         if (marks_.empty()) return true;
         const auto packet = [](int pixel, std::size_t packets) {
@@ -40,9 +40,9 @@ class ScreenMask {
     std::vector<std::uint8_t> marks_;
 };
 
-/// The packets of a plan's picture whose rays run through a block in which anything can be seen, and some
-/// about them.  Every block that bounds the visible ones marks its rectangle on the screen: a ray that meets
-/// one inside meets one of those on its way out.
+/// The packets of a plan's picture whose rays run through a visible block, and some around them.  Every block
+/// on the surface of the visible ones marks its rectangle on the screen: a ray that meets an inner block
+/// meets one of those when it leaves.
 ScreenMask visible_packets(const Plan& plan, const EmptySpace& empty);
 
 }  // namespace squint::lanes

@@ -1,12 +1,12 @@
-// Which SIMD targets are compiled: AVX-512, AVX2, SSE4, NEON and plain C++ (EMU128, "scalar"), and how one is
-// called by name. Included before Highway in every file of kernels.
+// The SIMD targets that are compiled: AVX-512, AVX2, SSE4, NEON and plain C++ (EMU128, "scalar"), and how to
+// call one by name.  Included before Highway in every file of kernels.
 #ifndef HWY_COMPILE_ALL_ATTAINABLE
 #define HWY_COMPILE_ALL_ATTAINABLE
 #endif
 #include <hwy/detect_targets.h>
 
-// Defines F(target, ...) that calls the same function of one target's namespace; Highway's own dispatch knows
-// only the best.
+// Defines F(target, ...), which calls the same function in the namespace of one target; Highway's own
+// dispatch offers only the best.
 #if HWY_TARGETS & HWY_AVX3
 #define SQUINT_CASE_AVX3(F, ...) \
     case HWY_AVX3:               \
