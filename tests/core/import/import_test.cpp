@@ -95,6 +95,11 @@ TEST_F(Import, TurnedAxesAreTakenAndNoVoxelIsMoved) {
         EXPECT_THAT(notes_of({.file = at(name)}),
                     testing::ElementsAre(HasSubstr("axes are turned by 25 degrees against x, y, z")));
     }
+    const Volume lps = load_path(at("turned.nrrd")),
+                 ras = load({.file = at("turned_ras.nrrd"), .space = "lps"});
+    EXPECT_EQ(ras.turn, lps.turn);
+    EXPECT_EQ(ras.origin, lps.origin);
+    EXPECT_EQ(ras.content_hash, lps.content_hash);
     const Volume quarter = load_path(at("quarter.nrrd")), rounded = load_path(at("rounded.nrrd"));
     EXPECT_FALSE(quarter.turned() || rounded.turned());
     EXPECT_EQ(quarter.dims, Index3(16, 20, 12));

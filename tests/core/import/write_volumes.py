@@ -244,6 +244,8 @@ def main(folder):
     last = (-(ORIGIN[0] + SPACING[0] * (NX - 1)), -(ORIGIN[1] + SPACING[1] * (NY - 1)), ORIGIN[2])
     write_nrrd(folder, "ras.nrrd", ras_from_lps(v), "right-anterior-superior", last)
     write_nrrd(folder, "turned.nrrd", v, "left-posterior-superior", turn() @ ORIGIN, turn())
+    half_turn = numpy.diag([-1, -1, 1])  # RAS from LPS
+    write_nrrd(folder, "turned_ras.nrrd", v, "right-anterior-superior", half_turn @ turn() @ ORIGIN, half_turn @ turn())
     quarter = numpy.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])
     write_nrrd(folder, "quarter.nrrd", v, "left-posterior-superior", quarter @ ORIGIN, quarter)
     rounding = 6.123e-17 * numpy.array([[1, 0, 0], [0, 1, 0], [0, 0, 0]])  # cos(90 degrees) in doubles
