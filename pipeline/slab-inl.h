@@ -161,6 +161,10 @@ class Slabs {
         if (inside.rule == InsideRule::front) return light_with(gradient_of(front), slab);
         if (inside.rule == InsideRule::middle) return light_with(gradient_between(front, back, 1, 1), slab);
         const std::array<W, 3>&at_front = gradient_of(front), &at_back = gradient_of(back);
+        if constexpr (requires { method_.fades; })
+            if (lights_fade(inside.rule))
+                return light_fading(at_front, at_back, fading_light_of(front.input, back.input, length, slab),
+                                    slab);
         observer_.at(Part::gradient);
         const std::array<W, 3> sum = sum_of_ends(at_front, at_back);
         if (inside.rule == InsideRule::mean) return light_with(sum, slab);
@@ -177,6 +181,28 @@ class Slabs {
             const std::array<W, 3> color = light_in_pieces(front, back, length, bits);
             for (std::size_t c = 0; c < 3; ++c) slab.color[c] = select(so_many, color[c], slab.color[c]);
         }
+    }
+
+    FadingLight<W> fading_light_of(W front, W back, W length, const Slab<W>& slab) const {
+        observer_.at(Part::classification);
+        return fading_light(method_, front, back, length, slab);
+    }
+    // Lights a slab between two raw gradients, where its tables say where its light lies.
+    void light_fading(const std::array<W, 3>& at_front, const std::array<W, 3>& at_back,
+                      const FadingLight<W>& light, Slab<W>& slab) const {
+        observer_.at(Part::gradient);
+        const std::array<W, 3> at_end = gradient_up_to(plan_.inside, at_front, at_back, light.end);
+        observer_.at(Part::normal);
+        const bool fades = plan_.gradient.fades;
+        const W zero = constant<W>(0);
+        const std::array<W, 2> certain{fades ? confidence(plan_.gradient, at_front) : zero,
+                                       fades ? confidence(plan_.gradient, at_end) : zero};
+        std::array<std::array<W, 3>, 2> normal{normalise(plan_.gradient, at_front),
+                                               normalise(plan_.gradient, at_end)};
+        share_normal(normal[0], normal[1]);
+        observer_.lit(normal[0]);
+        observer_.at(Part::shading);
+        shade_fading(plan_.shading, ray_, normal, certain, light, slab.color);
     }
 
     // The straight colour of a slab from 2^bits lit pieces.

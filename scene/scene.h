@@ -28,7 +28,14 @@ enum class AlphaEncoding { alpha, sqrt_alpha, transparency };  // what of an opa
 enum class ShadingModel { none, phong, blinn_phong, cone, gooch };
 enum class ConeSlope { energy, paper };
 enum class CoolSide { shadow, light };
-enum class InsideRule { mean, front, middle, adaptive };  // where inside a slab its light is computed
+enum class InsideRule {
+    mean,
+    front,
+    middle,
+    adaptive,
+    linear,
+    nlpi
+};  // where inside a slab its light is computed
 enum class PowerRule { squaring, parabola, table };
 enum class CompositingForm {
     automatic,
@@ -63,7 +70,7 @@ SQUINT_NAMES(AlphaEncoding, "alpha", "sqrt_alpha", "transparency");
 SQUINT_NAMES(ShadingModel, "none", "phong", "blinn_phong", "cone", "gooch");
 SQUINT_NAMES(ConeSlope, "energy", "paper");
 SQUINT_NAMES(CoolSide, "shadow", "light");
-SQUINT_NAMES(InsideRule, "mean", "front", "middle", "adaptive");
+SQUINT_NAMES(InsideRule, "mean", "front", "middle", "adaptive", "linear", "nlpi");
 SQUINT_NAMES(PowerRule, "squaring", "parabola", "table");
 SQUINT_NAMES(CompositingForm, "auto", "w", "w_carry", "equation_9", "alpha", "back_to_front", "unit255_shift",
              "unit255_blinn", "straight");
@@ -273,7 +280,9 @@ void visit_scene(S& scene, V&& visit) {
     visit(
         "shading.inside", shading.inside,
         "where inside a slab its light is taken: mean of the ends' gradients, front, middle, adaptive (1, 2 "
-        "or 4 pieces as it turns); default: mean; pc and pc_mid have one sample");
+        "or 4 pieces as it turns), linear (fades from end to end) or nlpi (with the normal kept at length "
+        "one), "
+        "both of pi2d; default: mean; pc and pc_mid have one sample");
     visit("shading.cone_slope", shading.cone_slope, "cone: energy, (n + 1) / 2 of exponent n, or paper, n");
     visit("shading.cool_side", shading.cool_side, "gooch: what turns cool, shadow or light (as printed)");
     visit("shading.cool", shading.cool, "gooch: colour of the cool side");

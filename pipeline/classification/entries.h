@@ -11,6 +11,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,6 +54,17 @@ struct Slab {
     std::array<W, 3> color;
     W alpha;
 };
+
+/// Where a slab's light lies along it: parts of its premultiplied colours and of its opacity (white) that sum to
+/// them, by Bernstein polynomials of degree count - 1 of the way from its front to `end`.
+template <class W>
+struct FadingLight {
+    int count;
+    std::array<std::array<W, 4>, 4> part;
+    W end;  // 1.kWayBits of the slab's way: where a wall ends it, or all of it
+};
+/// Fraction bits of a way along a slab.
+inline constexpr int kWayBits = 12;
 
 /// alpha = 1 - exp(-x): a table over x with rows 2^-row_bits apart, linear between them; beyond the last
 /// row, opaque to the last bit.  The lines err by 2^(-2 row_bits - 3), the table's words by half a last
@@ -138,6 +150,8 @@ struct ClassificationInputs {
     bool keeps_exact =
         true;  // keep exact values beside the words: Real reads them of a wire that it does not round
     double longest_ray = 1;  // in steps: errors of one sign add up over it
+    std::optional<InsideRule> inside =
+        std::nullopt;  // linear, nlpi: pi2d's tables hold where light lies in a slab
 };
 
 /// The most that a ray can lose, of 255, where each of its slabs errs by `error` of optical depth and is at

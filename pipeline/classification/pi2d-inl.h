@@ -30,34 +30,82 @@ HWY_INLINE EntryPosition<W> node_position(const PreIntegrated2D& m, W input) {
     return {cell, within(min(node - shift_left(cell, bits), constant<W>(one)), 0, one)};
 }
 
-/// Interpolates the table between its nodes: three lerps, each rounded once.
+/// Interpolates a table between its nodes: three lerps, each rounded once.
+template <class W>
+HWY_INLINE std::array<W, 4> between_cells(const PreIntegrated2D& m, const CellTable& cells,
+                                          const EntryPosition<W>& f, const EntryPosition<W>& b) {
+    if (m.nearest) return gather_cell(cells, f.entry, b.entry);
+    const auto [left, right] = gather_two_cells(cells, f.entry, b.entry);
+    const auto [below, across] = gather_two_cells(cells, f.entry + constant<W>(1), b.entry);
+    std::array<W, 4> cell;
+    for (std::size_t c = 0; c < 4; ++c) {
+        const Rescale& to = c < 3 ? m.to_color : m.to_alpha;
+        const W here = quantise(blend(left[c], right[c], b.fraction, m.node_fraction), to);
+        const W next = quantise(blend(below[c], across[c], b.fraction, m.node_fraction), to);
+        cell[c] = quantise(blend(here, next, f.fraction, m.node_fraction), to);
+    }
+    return cell;
+}
 template <class W>
 HWY_INLINE Slab<W> look_up(const PreIntegrated2D& m, W front, W back) {
-    const EntryPosition<W> f = node_position(m, front), b = node_position(m, back);
-    std::array<W, 4> cell;
-    if (m.nearest) {
-        cell = gather_cell(m.cells, f.entry, b.entry);
-    } else {
-        const auto [left, right] = gather_two_cells(m.cells, f.entry, b.entry);
-        const auto [below, across] = gather_two_cells(m.cells, f.entry + constant<W>(1), b.entry);
-        for (std::size_t c = 0; c < 4; ++c) {
-            const Rescale& to = c < 3 ? m.to_color : m.to_alpha;
-            const W here = quantise(blend(left[c], right[c], b.fraction, m.node_fraction), to);
-            const W next = quantise(blend(below[c], across[c], b.fraction, m.node_fraction), to);
-            cell[c] = quantise(blend(here, next, f.fraction, m.node_fraction), to);
-        }
-    }
+    const std::array<W, 4> cell = between_cells(m, m.cells, node_position(m, front), node_position(m, back));
     const W limit = largest_color(m.premultiplied, cell[3]);
     return {{min(cell[0], limit), min(cell[1], limit), min(cell[2], limit)}, cell[3]};
 }
 
+/// The part of a slab in front of a wall.
+template <class W>
+HWY_INLINE Slab<W> translucent_part(const PreIntegrated2D& m, const CutSlab<W>& cut, const Slab<W>& full,
+                                    W length) {
+    Slab<W> slab = full;
+    const auto other = is_shorter(m.prefix.entries, length) | (constant<W>(0) < cut.wall);
+    take_own_depth(m.prefix, m.premultiplied, cut, length, other, slab);
+    return slab;
+}
 template <class W>
 HWY_INLINE Slab<W> classify(const PreIntegrated2D& m, W front, W back, W length) {
     const CutSlab<W> cut = cut_at_wall(m.prefix, front, back);
-    Slab<W> slab = look_up(m, front, cut.end_input);
-    const auto other = is_shorter(m.prefix.entries, length) | (constant<W>(0) < cut.wall);
-    take_own_depth(m.prefix, m.premultiplied, cut, length, other, slab);
-    return finish_premultiplied(m.prefix, m.premultiplied, cut, front, length, slab);
+    const Slab<W> part = translucent_part(m, cut, look_up(m, front, cut.end_input), length);
+    return finish_premultiplied(m.prefix, m.premultiplied, cut, front, length, part);
+}
+
+/// Of the slab that classify gave.  What a shorter or cut slab keeps of a full one it keeps of each part; a wall
+/// and, where the ends are equal, a point's rest stand at the end.
+template <class W>
+HWY_INLINE FadingLight<W> fading_light(const PreIntegrated2D& m, W front, W back, W length,
+                                       const Slab<W>& whole) {
+    const CutSlab<W> cut = cut_at_wall(m.prefix, front, back);
+    const Slab<W> full = look_up(m, front, cut.end_input), slab = translucent_part(m, cut, full, length);
+    const EntryPosition<W> f = node_position(m, front), b = node_position(m, cut.end_input);
+    const auto has_wall = constant<W>(0) < cut.wall, other = is_shorter(m.prefix.entries, length) | has_wall;
+    FadingLight<W> light{static_cast<int>(m.fades.size()) + 1, {}, constant<W>(std::int64_t{1} << kWayBits)};
+    if (any(has_wall)) {
+        const W part = within(quotient(absolute(cut.end_input - front), divisor<W>(cut.span), m.to_way), 0,
+                              std::int64_t{1} << kWayBits);
+        light.end = select(has_wall, part, light.end);
+    }
+    const auto with_white = [&](const Slab<W>& s) -> std::array<W, 4> {
+        return {s.color[0], s.color[1], s.color[2], largest_color(m.premultiplied, s.alpha)};
+    };
+    const std::array<W, 4> seen = with_white(slab), all = with_white(whole);
+    light.part[0] = seen;
+    for (std::size_t k = 1; k <= m.fades.size(); ++k) {
+        const std::array<W, 4> cell = between_cells(m, m.fades[k - 1], f, b);
+        const std::array<W, 4> part{cell[0], cell[1], cell[2], largest_color(m.premultiplied, cell[3])};
+        const auto kept = [&](W of_full) {
+            const Slab<W> less =
+                with_alpha(m.premultiplied, {{of_full, of_full, of_full}, full.alpha}, slab.alpha);
+            return select(other, less.color[0], of_full);
+        };
+        for (std::size_t c = 0; c < 4; ++c) {
+            light.part[k][c] = min(any(other) ? kept(part[c]) : part[c], light.part[0][c]);
+            light.part[0][c] = within(light.part[0][c] - light.part[k][c], 0, m.premultiplied.one_color);
+        }
+    }
+    std::array<W, 4>& last = light.part[m.fades.size()];
+    for (std::size_t c = 0; c < 4; ++c)
+        last[c] = clamp(last[c] + (all[c] - seen[c]), constant<W>(0), constant<W>(m.premultiplied.one_color));
+    return light;
 }
 
 }  // namespace squint::HWY_NAMESPACE

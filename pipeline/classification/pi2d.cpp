@@ -1,5 +1,7 @@
 #include "pipeline/classification/pi2d.h"
 
+#include "core/error.h"
+#include "pipeline/classification/tables/fade_table.h"
 #include "pipeline/classification/tables/pi2d_table.h"
 
 #include <fmt/format.h>
@@ -87,6 +89,38 @@ double lost_between_nodes(const ClassificationInputs& in, int size) {
     return worst;
 }
 
+// The words of build_fades' tables, and the doubles for when nothing is rounded.
+std::vector<CellTable> build_fade_cells(const Entries& entries, int size, double length, bool linear,
+                                        const Encode& encode) {
+    constexpr int kMostNodes = 1024;
+    if (size > kMostNodes)
+        throw InputError(
+            fmt::format("classification.table_size: {} nodes a side, but shading.inside = \"{}\" has tables "
+                        "of {} at most",
+                        size, linear ? "linear" : "nlpi", kMostNodes));
+    const std::vector<std::vector<double>> built = preintegration::build_fades(entries, size, length, linear);
+    std::vector<CellTable> tables;
+    for (std::size_t t = 0; t < built.size(); ++t) {
+        CellTable& table = tables.emplace_back(size, encode.largest());
+        table.wire = static_cast<int>(Wire::slab_color),
+        table.alpha_wire = static_cast<int>(Wire::slab_alpha);
+        for (std::size_t i = 0; i < built[t].size(); ++i) {
+            const int channel = static_cast<int>(i % 4);
+            if (table.is_narrow())
+                encode(channel, std::span(&built[t][i], 1), table.narrow().subspan(i, 1));
+            else
+                encode(channel, std::span(&built[t][i], 1), table.wide().subspan(i, 1));
+        }
+        table.exact_from([=] {
+            std::vector<double> raw = preintegration::build_fades(entries, size, length, linear)[t];
+            for (std::size_t i = 0; i < raw.size(); ++i)
+                encode(static_cast<int>(i % 4), std::span<const double>(&raw[i], 1), std::span(&raw[i], 1));
+            return raw;
+        });
+    }
+    return tables;
+}
+
 }  // namespace
 
 void PreIntegrated2D::describe(ClassificationReport& report) const {
@@ -95,6 +129,9 @@ void PreIntegrated2D::describe(ClassificationReport& report) const {
         {"cells", cells.size(), cells.size(), static_cast<std::int64_t>(cells.bytes()),
          fmt::format("colour and opacity over both ends, {} bits a word, {}", cells.is_narrow() ? 16 : 32,
                      self_attenuation ? "with self-attenuation" : "without self-attenuation")});
+    for (const CellTable& fade : fades)
+        report.tables.push_back({"fades", fade.size(), fade.size(), static_cast<std::int64_t>(fade.bytes()),
+                                 "where a slab's light lies along it"});
     report.add(between_nodes);
     if (cells.size() < entries)
         report.notes.push_back(
@@ -128,6 +165,10 @@ PreIntegrated2D build_pre_integrated_2d(const ClassificationInputs& in) {
         fill<double>(entries, size, length, attenuated, encode, raw);
         return raw;
     });
+    if (in.inside == InsideRule::linear || in.inside == InsideRule::nlpi)
+        m.fades = build_fade_cells(entries, size, length, in.inside == InsideRule::linear, encode);
+    m.to_way = Rescale(-kWayBits, Spec{{1, 0, false}, Rounding::rnd, Overflow::sat});
+    m.to_way.divides = true;
     // Weights are as fine as the input, or finer by as many bits as a node has entries; products of 16-bit
     // nodes and quotients stay within 32-bit lanes.
     m.scaled = size != m.entries;

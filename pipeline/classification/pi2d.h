@@ -10,6 +10,8 @@
 #include "fixedpoint/cell_table.h"
 #include "pipeline/classification/prefix.h"
 
+#include <vector>
+
 namespace squint {
 
 struct PreIntegrated2D {
@@ -18,6 +20,10 @@ struct PreIntegrated2D {
     PrefixLookup prefix;
     PremultipliedRules premultiplied;
     CellTable cells;
+    // Where light fades inside a slab: int u c m du (linear), or its Bernstein moments B_1 to B_3 (nlpi), of the
+    // colours and of white.  B_0 is what is left of the slab, so that rounding cannot unbalance them.
+    std::vector<CellTable> fades;
+    Rescale to_way;  // the part of a slab's way up to a wall
     bool nearest = false, self_attenuation = true;
     int entries = 0;
     int node_fraction = 0;  // of a coordinate in nodes
@@ -29,6 +35,7 @@ struct PreIntegrated2D {
     template <class V>
     void visit(V&& v) {
         prefix.visit(v), premultiplied.visit(v), v(cells), v(to_node), v(to_color), v(to_alpha);
+        for (CellTable& fade : fades) v(fade);
     }
     int entry_reach() const { return (entries - 2) / (cells.size() - 1) + 1; }
     void describe(ClassificationReport& report) const;

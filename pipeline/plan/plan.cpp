@@ -89,7 +89,8 @@ ClassificationInputs classification_inputs(const Plan& plan) {
             step,
             plan.specs[Wire::classification_input].format.fraction_bits,
             false,
-            plan.projection_mode ? 1 : most_steps(plan)};
+            plan.projection_mode ? 1 : most_steps(plan),
+            plan.lit ? plan.scene.shading.inside : std::nullopt};
 }
 
 void find_unseen_inputs(Plan& plan) {
@@ -164,6 +165,11 @@ InsideRule inside_rule(Plan& plan) {
             "{}: found \"adaptive\", but {} has no tables for parts of a slab; allowed: mean, front, middle, "
             "or classification.method = \"pips\" or \"leg\"",
             where(plan.scene, "shading.inside"), method));
+    if (asked && lights_fade(*asked) && plan.scene.classification.method != Method::pi2d)
+        throw InputError(fmt::format(
+            "{}: found \"{}\", but {} has no tables of where light lies in a slab; allowed: mean, front, "
+            "middle{}, or classification.method = \"pi2d\"",
+            where(plan.scene, "shading.inside"), name_of(*asked), method, has_parts ? ", adaptive" : ""));
     return asked.value_or(InsideRule::mean);
 }
 

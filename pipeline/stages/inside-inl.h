@@ -90,6 +90,31 @@ HWY_INLINE std::array<W, 3> for_pieces(const GradientStage& s, const std::array<
     return s.fades ? sum_of_ends(gradient, gradient) : gradient;
 }
 
+/// The gradient part of the way from a slab's front to its back.
+template <class W>
+HWY_INLINE std::array<W, 3> gradient_up_to(const InsideStage& s, const std::array<W, 3>& front,
+                                           const std::array<W, 3>& back, W way) {
+    std::array<W, 3> gradient;
+    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+        gradient[a] = front[a] + quantise((back[a] - front[a]) * way, s.to_end);
+    });
+    return gradient;
+}
+/// Of two normals, one of which is zero, both become the other.
+template <class W>
+HWY_INLINE void share_normal(std::array<W, 3>& front, std::array<W, 3>& back) {
+    const W zero = constant<W>(0);
+    const auto is_zero = [&](const std::array<W, 3>& n) {
+        return absolute(n[0]) + absolute(n[1]) + absolute(n[2]) == zero;
+    };
+    const auto front_is_zero = is_zero(front), back_is_zero = is_zero(back);
+    for (std::size_t a = 0; a < 3; ++a) {
+        const W from_front = front[a];
+        front[a] = select(front_is_zero, back[a], front[a]);
+        back[a] = select(back_is_zero, from_front, back[a]);
+    }
+}
+
 /// The light of a slab's pieces, front to back, joined to one straight colour.
 template <class W>
 struct PieceLight {

@@ -1,5 +1,6 @@
 #include "pipeline/stages/inside.h"
 
+#include "pipeline/classification/entries.h"
 #include "pipeline/stages/inputs.h"
 #include "pipeline/stages/location.h"
 
@@ -40,6 +41,7 @@ InsideStage build_inside(const StageInputs& in, const LocationStage& location) {
     s.one_alpha = in.specs[Wire::slab_alpha].format.one();
     s.largest_lit = in.specs[Wire::lit_color].format.largest();
     s.least_cut = std::max<std::int64_t>(s.one_alpha >> 10, 32);
+    s.to_end = to_way(in, Wire::gradient, kWayBits);
     s.to_part = rescale(in, 2 * fraction(in, Wire::slab_alpha), Wire::slab_alpha);
     // Belongs to no wire: intervals cannot see that a mean of lit colours needs no limit.
     s.to_whole = Rescale(fraction(in, Wire::lit_color), in.specs[Wire::lit_color]);

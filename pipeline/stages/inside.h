@@ -4,6 +4,8 @@
 //     mean       the mean of the raw gradients at both ends
 //     front      the gradient at the front end
 //     middle     one gradient, sampled at the slab's middle
+//     linear     fades from the front end's to the back end's (Lum et al. 2004): pi2d's tables say how
+//     nlpi       the same, the normal between them kept at length one by a quadratic (Guetat et al. 2010)
 //     adaptive   up to an angle between the ends' gradients as mean; beyond it 2 or 4 pieces, each a slab of
 //                the method's own tables with a gradient sampled at its middle
 #pragma once
@@ -19,6 +21,10 @@ namespace squint {
 /// A slab is cut into at most 2^kMostCuts pieces.
 inline constexpr int kMostCuts = 2;
 
+/// Whether a rule wants tables of where light lies in a slab.
+constexpr bool lights_fade(InsideRule rule) {
+    return rule == InsideRule::linear || rule == InsideRule::nlpi;
+}
 /// Whether a rule lights by the sum of the gradients at a slab's ends.
 constexpr bool lights_by_ends(InsideRule rule) {
     return rule == InsideRule::mean || rule == InsideRule::adaptive;
@@ -34,6 +40,7 @@ struct InsideStage {
     std::int64_t highest_input = 0;
     std::int64_t least_cut = 0;  // slabs of less opacity are not cut: 2^-10, or 32 last bits
     std::int64_t one_alpha = 0, largest_lit = 0;
+    Rescale to_end;    // a gradient on the way to the back
     Rescale to_part;   // light behind earlier pieces
     Rescale to_whole;  // light of all pieces over their opacity
 
@@ -46,7 +53,7 @@ struct InsideStage {
         for (Rescale& r : to_location) v(r);
         for (Rescale& r : to_input) v(r);
         for (Rescale& r : to_length) v(r);
-        v(to_part), v(to_whole);
+        v(to_end), v(to_part), v(to_whole);
     }
 };
 

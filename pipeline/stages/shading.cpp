@@ -33,6 +33,31 @@ GoochTones build_gooch(const StageInputs& in) {
     return g;
 }
 
+KeptLength build_kept_length(const StageInputs& in) {
+    KeptLength k;
+    k.wanted = in.inside == InsideRule::nlpi;
+    const ShadingSettings& settings = in.scene.shading;
+    k.held = k.wanted && settings.ka + settings.kd + settings.ks <= 1;
+    const Spec arc{{2, KeptLength::kArcBits, false}, Rounding::rnd_conv, Overflow::sat};
+    k.row_bits = std::min(KeptLength::kRowBits, fraction(in, Wire::dot));
+    if (k.wanted) {
+        const int rows = 1 << k.row_bits;
+        k.arc = Table(rows + 1, 1);
+        for (int i = 0; i <= rows; ++i)
+            k.arc.set(i, 0, 2 * std::sqrt(2 / (1 + std::ldexp(i, -k.row_bits))) - 1, arc);
+    }
+    k.arc.wire = wire_index(Wire::dot);
+    k.to_turn = rescale(in, 2 * fraction(in, Wire::normal), Wire::dot);
+    k.to_arc =
+        Rescale(KeptLength::kArcBits + fraction(in, Wire::dot) - k.row_bits, arc, wire_index(Wire::dot));
+    Spec between = in.specs[Wire::intensity];
+    between.overflow = Overflow::sat;
+    k.to_between =
+        Rescale(fraction(in, Wire::intensity) + KeptLength::kArcBits, between, wire_index(Wire::intensity));
+    k.to_between.divides = true;
+    return k;
+}
+
 }  // namespace
 
 std::vector<WireFormats> shading_wires(const PresetInputs& in) {
@@ -115,6 +140,7 @@ ShadingStage build_shading(const StageInputs& in) {
     s.fades = in.lit && settings.gradient_floor > 0;
     s.to_faded = rescale(in, s.intensity_fraction + fraction(in, Wire::confidence), Wire::intensity);
     s.gooch = build_gooch(in);
+    s.kept = build_kept_length(in);
     s.to_light = rescale(in, s.light_fraction, Wire::light);
     s.to_dot = rescale(in, s.normal_fraction + s.light_fraction, Wire::dot);
     s.to_light_view = rescale(in, 2 * s.light_fraction, Wire::dot);

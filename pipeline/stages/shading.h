@@ -16,16 +16,27 @@ struct StageInputs;
 
 /// Shading models.  Each is a file in shading/; shading-inl.h lists them.
 struct Phong {
-    static constexpr bool kHeldToOpacity = false;
+    static constexpr bool kHeldToOpacity = false, kHasHighlights = true;
 };
 struct BlinnPhong {
-    static constexpr bool kHeldToOpacity = false;
+    static constexpr bool kHeldToOpacity = false, kHasHighlights = true;
 };
 struct Cone {
-    static constexpr bool kHeldToOpacity = false;
+    static constexpr bool kHeldToOpacity = false, kHasHighlights = true;
 };
 struct Gooch {
-    static constexpr bool kHeldToOpacity = true;
+    static constexpr bool kHeldToOpacity = true, kHasHighlights = false;
+};
+
+/// shading.inside nlpi: the normal between two is kept at length one by a quadratic (Guetat et al. 2010, equation
+/// 8 in Bernstein form).
+struct KeptLength {
+    static constexpr int kRowBits = 8, kArcBits = 13;
+    bool wanted = false;
+    bool held = false;  // to the opacity: ka + kd + ks is one at most
+    Table arc;          // 2 / cos a - 1 over N_f.N_b = cos 2a in [0, 1]; errs by 4e-6 between its rows
+    int row_bits = 0;
+    Rescale to_turn, to_arc, to_between;
 };
 
 /// Constants of Gooch's model, for the cool side and the warm one: raw in the material format, and
@@ -64,6 +75,7 @@ struct ShadingConstants {
     std::int64_t parabola_slope = 0;  // 2 times (exponent + 1) / 2: keeps the lobe's energy; one fraction bit
     int power_table_bits = 0;
     GoochTones gooch;
+    KeptLength kept;
     Rescale to_light_view;  // Phong: L.V
     Rescale to_dot, to_reflected, to_power_input, to_power, to_power_lerp, to_fall, to_diffuse_sum,
         to_specular_sum, to_faded, to_diffuse, to_specular, to_lit;
@@ -81,6 +93,7 @@ struct ShadingStage : ShadingConstants {
               &to_diffuse_sum, &to_specular_sum, &to_faded, &to_diffuse, &to_specular, &to_lit, &to_light})
             v(*r);
         v(gooch.to_faded), v(gooch.to_side), v(power_table);
+        v(kept.arc), v(kept.to_turn), v(kept.to_arc), v(kept.to_between);
     }
     /// Whether each ray has words of its own.
     bool needs_ray() const { return half_per_ray || model == ShadingModel::phong; }

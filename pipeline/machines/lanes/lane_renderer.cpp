@@ -191,6 +191,7 @@ StageWays ways_of(const Plan& plan) {
 
 std::optional<std::string> what_needs_the_model(const Plan& plan) {
     if (plan.real && !plan.float32) return "nothing is rounded";
+    if (lights_fade(plan.inside.rule)) return "light that fades inside slabs is drawn by the model";
     if (plan.float32) {  // formats do not matter
         if (plan.projection_mode) return "mip, minip and average of floats run in the model";
         if (plan.scene.output.depth || plan.scene.output.normals)

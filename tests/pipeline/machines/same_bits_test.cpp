@@ -221,9 +221,13 @@ Case draw_case(unsigned seed, const std::string& preset) {
     scene.classification = {};
     ClassificationSettings& method = scene.classification;
     method.method = draw.one_of({Method::pc, Method::pc_mid, draw.any_of<Method>(), draw.any_of<Method>()});
-    if (draw.once_in(2)) scene.shading.inside = draw.any_of<InsideRule>();
+    if (draw.once_in(2))  // the last two run in the model
+        scene.shading.inside =
+            draw.one_of({InsideRule::mean, InsideRule::front, InsideRule::middle, InsideRule::middle,
+                         InsideRule::adaptive, InsideRule::adaptive, InsideRule::linear, InsideRule::nlpi});
     if (scene.shading.inside == InsideRule::adaptive && method.method != Method::leg)
         method.method = Method::pips;
+    if (scene.shading.inside && lights_fade(*scene.shading.inside)) method.method = Method::pi2d;
     if (scene.sampling.interpolation == InterpolationRule::nearest && method.method != Method::pc_mid)
         method.method = Method::pc;  // slab methods are refused there
     method.order = static_cast<int>(method.method == Method::leg ? draw.between(2, 4) : draw.between(1, 5));

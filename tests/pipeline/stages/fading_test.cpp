@@ -1,0 +1,246 @@
+// Light that fades inside a slab: pi2d's tables of where it lies, and what linear and nlpi make of it between two
+// normals (docs/papers/guetat.md).  The exact values are those of even matter, x = int tau.
+#include "core/error.h"
+#include "pipeline/classification/tables/fade_table.h"
+#include "pipeline/record.h"
+#include "pipeline/slab-inl.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <numeric>
+#include <random>
+#include <string>
+#include <vector>
+
+namespace squint {
+namespace {
+
+using namespace HWY_NAMESPACE;
+using preintegration::FadeMoments;
+using Word = std::int64_t;
+
+Entries even_matter(double x) {
+    Entries entries;
+    entries.entry.resize(2);
+    for (Entry& entry : entries.entry) entry.color = Vec3(1, 1, 1), entry.extinction = x;
+    return entries;
+}
+
+struct Moments {
+    double x, i0, i1, i2, i3;
+};
+constexpr Moments kMoments[] = {{0.5, 0.393469340287, 0.180408020862, 0.115101423736, 0.084077882702},
+                                {1, 0.632120558829, 0.264241117657, 0.160602794143, 0.113928941257},
+                                {2, 0.864664716763, 0.296997075145, 0.161661791908, 0.107157404626},
+                                {4, 0.981684361111, 0.227105451389, 0.095237086806, 0.053112176216}};
+
+TEST(FadeMoments, AreTheExactOnesOfEvenMatter) {
+    for (const Moments& m : kMoments)
+        for (const double back : {1.0, 0.0, 0.25}) {  // rising, falling, and a part of an entry
+            const FadeMoments b = preintegration::fade_moments(even_matter(m.x), back == 0 ? 1 : 0, back, 1);
+            for (std::size_t c = 0; c < 4; ++c) {
+                EXPECT_NEAR(b[0][c] + b[1][c] + b[2][c] + b[3][c], m.i0, 1e-12);
+                EXPECT_NEAR(preintegration::first_moment(b)[c], m.i1, 1e-12);
+                EXPECT_NEAR(b[2][c] / 3 + b[3][c], m.i2, 1e-12);
+                EXPECT_NEAR(b[3][c], m.i3, 1e-12);
+            }
+        }
+}
+
+/// Matter with a colour and an extinction of its own at every entry, thin, thick and none.
+Entries any_matter(int size, unsigned seed) {
+    std::mt19937_64 random(seed);
+    const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
+    Entries entries;
+    entries.entry.resize(static_cast<std::size_t>(size));
+    for (Entry& entry : entries.entry) {
+        entry.color = Vec3(unit(), unit(), unit());
+        const std::uint64_t kind = random() % 8;
+        entry.extinction = kind < 2 ? 0 : kind == 2 ? 200 * unit() : 3 * unit();
+    }
+    return entries;
+}
+
+TEST(FadeMoments, OfTablesAreThoseOfEachSlab) {
+    for (const auto& [entries, nodes] : {std::pair{100, 100}, {300, 129}, {40, 161}}) {
+        const Entries matter = any_matter(entries, 7);
+        const auto tables = preintegration::build_fades(matter, nodes, 0.8, false),
+                   first = preintegration::build_fades(matter, nodes, 0.8, true);
+        ASSERT_EQ(tables.size(), 3u);
+        ASSERT_EQ(first.size(), 1u);
+        for (int front = 0; front < nodes; front += 3)
+            for (int back = 0; back < nodes; back += 2) {
+                const auto coordinate = [&](int node) { return node * (entries - 1.0) / (nodes - 1); };
+                const FadeMoments b =
+                    preintegration::fade_moments(matter, coordinate(front), coordinate(back), 0.8);
+                const auto at = static_cast<std::size_t>(front * nodes + back) * 4;
+                for (std::size_t c = 0; c < 4; ++c) {
+                    // Three roundings of 2^-53 at each of 97 steps, which grow by (1 + 1/65)^(3 97) = 86 while
+                    // the origin moves, in Bernstein sums of up to 12 moments.
+                    for (std::size_t k = 1; k < 4; ++k) ASSERT_NEAR(tables[k - 1][at + c], b[k][c], 4e-11);
+                    ASSERT_NEAR(first[0][at + c], preintegration::first_moment(b)[c], 4e-11);
+                }
+            }
+    }
+}
+
+Plan plan_of(const std::string& rule, double x, const std::string& preset,
+             std::vector<std::string> more = {}) {
+    std::vector<std::string> settings{
+        "volume.procedural=ramp",
+        "volume.dims=33",
+        "volume.bits=12",
+        "classification.method=pi2d",
+        "classification.table_size=64",
+        "transfer_function.entries=64",
+        "transfer_function.unit_distance=1",
+        "shading.model=blinn_phong",
+        "shading.ka=0",
+        "shading.kd=1",
+        "shading.ks=0",
+        "shading.inside=" + rule,
+        "precision.preset=" + preset,
+        "sampling.step=1",
+        fmt::format("transfer_function.points=[[0,1,1,1,{0:.17g}],[4095,1,1,1,{0:.17g}]]", -std::expm1(-x))};
+    settings.insert(settings.end(), more.begin(), more.end());
+    const Scene scene = scene_with(built_in_scene(), settings);
+    return make_plan(scene, std::make_shared<Volume>(load_volume(volume_source(scene))));
+}
+template <class W>
+W word(double value) {
+    if constexpr (std::same_as<W, Word>)
+        return static_cast<Word>(std::floor(value + 0.5));
+    else
+        return W{value};
+}
+
+/// The light of even matter of depth x whose unit normal turns by so many degrees from the light's direction, lit
+/// over its whole slab.
+template <class W>
+double lit(const Plan& plan, double degrees) {
+    const auto& method = std::get<PreIntegrated2D>(plan.method);
+    const W front = word<W>(0), back = word<W>(static_cast<double>(plan.input.highest)),
+            full = word<W>(std::ldexp(1.0, plan.location.length_fraction));
+    Slab<W> slab = classify(method, front, back, full);
+    const FadingLight<W> light = fading_light(method, front, back, full, slab);
+    const double angle = degrees * std::numbers::pi / 180,
+                 one = std::ldexp(1.0, plan.shading.normal_fraction);
+    const Vec3 towards =
+        plan.scene.lights[0].headlight ? -plan.camera.view : plan.scene.lights[0].direction.normalized();
+    const Vec3 across = towards.cross(Vec3(0.3, 0.9, 0.1)).normalized();
+    const Vec3 turned = towards * std::cos(angle) + across * std::sin(angle);
+    const auto as_word = [&](const Vec3& v) {
+        return std::array<W, 3>{word<W>(v[0] * one), word<W>(v[1] * one), word<W>(v[2] * one)};
+    };
+    shade_fading(plan.shading, RayWords<W>{}, {as_word(towards), as_word(turned)}, {word<W>(0), word<W>(0)},
+                 light, slab.color);
+    return to_double(slab.color[1]) / std::ldexp(1.0, plan.shading.color_fraction);
+}
+
+struct Turning {
+    double degrees, linear, nlpi;
+};
+constexpr Turning kTurning[] = {{0, 0.632120558829, 0.632120558829},
+                                {30, 0.596719, 0.610460},
+                                {60, 0.500000, 0.549691},
+                                {90, 0.367879, 0.462261}};
+
+TEST(FadingLight, OfATurningSlabIsThePapers) {
+    const Plan linear = plan_of("linear", 1, "real"), nlpi = plan_of("nlpi", 1, "real");
+    for (const Turning& t : kTurning) {
+        EXPECT_NEAR(lit<Real<double>>(linear, t.degrees), t.linear, 1e-6) << t.degrees;
+        // A table of 257 rows for the arc, straight between them.
+        EXPECT_NEAR(lit<Real<double>>(nlpi, t.degrees), t.nlpi, 4e-6) << t.degrees;
+    }
+    // Beyond 90 degrees the quadratic is left for the straight line.
+    for (const double degrees : {91.0, 120.0, 180.0})
+        EXPECT_NEAR(lit<Real<double>>(nlpi, degrees), lit<Real<double>>(linear, degrees), 1e-9) << degrees;
+}
+
+TEST(FadingLight, InWordsErrsByAFewLastBits) {
+    for (const char* rule : {"linear", "nlpi"}) {
+        const Plan words = plan_of(rule, 1, "default"), real = plan_of(rule, 1, "real");
+        for (double degrees = 0; degrees <= 180; degrees += 8)  // not 90, where the quadratic ends
+            // Half a last bit of each of four parts and coefficients, of the turn and the arc, and of the light.
+            EXPECT_NEAR(lit<Word>(words, degrees), lit<Real<double>>(real, degrees), 6 * 0x1p-15)
+                << rule << ' ' << degrees;
+    }
+}
+
+// Parts are taken from the slab itself: whatever is rounded, and wherever a wall or a ray's end cuts it.
+TEST(FadingLight, PartsSumToTheSlab) {
+    for (const char* rule : {"linear", "nlpi"})
+        for (const char* points :
+             {"[[0,1,0.2,0,0],[1000,0,1,0.4,0.3],[2500,0.5,0.5,1,0.9],[4095,1,1,1,0.1]]",
+              "[[0,1,0.2,0,0],[1000,0,1,0.4,0.3],[2015,0.5,0.5,1,1],[2500,1,1,1,0.1]]"}) {
+            const Plan plan =
+                plan_of(rule, 1, "default", {std::string("transfer_function.points=") + points});
+            const auto& method = std::get<PreIntegrated2D>(plan.method);
+            std::mt19937_64 random(11);
+            const auto below = [&](Word end) {
+                return static_cast<Word>(random() % static_cast<std::uint64_t>(end));
+            };
+            int walls = 0;
+            for (int i = 0; i < 20'000; ++i) {
+                const Word front = below(plan.input.highest + 1),
+                           back = i % 16 == 0 ? front : below(plan.input.highest + 1);
+                const Word full = Word{1} << plan.location.length_fraction;
+                const Word length = i % 3 == 0 ? 1 + below(full) : full;
+                const Slab<Word> slab = classify(method, front, back, length);
+                const FadingLight<Word> light = fading_light(method, front, back, length, slab);
+                ASSERT_EQ(light.count, rule == std::string("linear") ? 2 : 4);
+                for (std::size_t c = 0; c < 4; ++c) {
+                    Word sum = 0;
+                    for (int k = 0; k < light.count; ++k) {
+                        ASSERT_GE(light.part[static_cast<std::size_t>(k)][c], 0);
+                        sum += light.part[static_cast<std::size_t>(k)][c];
+                    }
+                    const Word all = c < 3 ? slab.color[c] : largest_color(method.premultiplied, slab.alpha);
+                    // A point is its own matter's; the cell's beside it may be brighter by roundings.
+                    ASSERT_TRUE(sum == all || (front == back && std::abs(sum - all) < 64))
+                        << front << ' ' << back << ' ' << length << ": " << sum << ", not " << all;
+                }
+                walls += light.end < Word{1} << kWayBits;
+            }
+            EXPECT_EQ(walls > 0, std::string(points).find("1,1]") != std::string::npos);
+        }
+}
+
+TEST(FadingLight, AZeroNormalTakesTheOthers) {
+    std::array<Word, 3> none{0, 0, 0}, other{3, -4, 12};
+    share_normal(none, other);
+    EXPECT_EQ(none, other);
+    none = {0, 0, 0};
+    share_normal(other, none);
+    EXPECT_EQ(none, other);
+    std::array<Word, 3> front{1, 0, 0}, back{0, 1, 0};
+    share_normal(front, back);
+    EXPECT_EQ(front, (std::array<Word, 3>{1, 0, 0}));
+    EXPECT_EQ(back, (std::array<Word, 3>{0, 1, 0}));
+}
+
+TEST(FadingLight, IsRefusedWithoutTables) {
+    for (const char* rule : {"linear", "nlpi"})
+        for (const char* method : {"pips", "pi1d", "pi2d_no_attenuation"}) try {
+                plan_of(rule, 1, "default", {std::string("classification.method=") + method});
+                ADD_FAILURE() << rule << ' ' << method;
+            } catch (const InputError& error) {
+                const std::string text = error.what();
+                for (const char* part : {"shading.inside", rule, method, "\"pi2d\"", "middle"})
+                    EXPECT_NE(text.find(part), std::string::npos) << text;
+                EXPECT_EQ(text.find("adaptive") != std::string::npos, method == std::string("pips")) << text;
+            }
+    try {
+        plan_of("nlpi", 1, "default", {"classification.table_size=2048"});
+        ADD_FAILURE();
+    } catch (const InputError& error) {
+        EXPECT_NE(std::string(error.what()).find("1024 at most"), std::string::npos) << error.what();
+    }
+}
+
+}  // namespace
+}  // namespace squint
