@@ -4,6 +4,7 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/procedural.h"
+#include "core/text.h"
 #include "core/volume_source.h"
 #include "scene/from_data.h"
 
@@ -20,13 +21,28 @@
 
 namespace squint::cli {
 
-void print(std::string_view text) {
+namespace {
+/// Its lines, each as printable() has it.
+std::string printable_lines(std::string_view text) {
+    std::string out;
+    for (std::size_t end; (end = text.find('\n')) != std::string_view::npos; text.remove_prefix(end + 1))
+        out += printable(text.substr(0, end)) + '\n';
+    return out + printable(text);
+}
+}  // namespace
+
+void print(std::string_view given) {
+    const std::string text = printable_lines(given);
     if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
         throw InputError(fmt::format("standard output: cannot write: {}", std::strerror(errno)));
 }
 
-void print_json(const nlohmann::ordered_json& json) {
-    print(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+void say(std::string_view text) {
+    std::fputs(printable_lines(text).c_str(), stderr);
+}
+
+void print_json(const nlohmann::ordered_json& json, int indent) {
+    print(json.dump(indent, ' ', true, nlohmann::ordered_json::error_handler_t::replace) + "\n");
 }
 
 void write_json(const std::string& path, const nlohmann::ordered_json& json) {
@@ -98,7 +114,7 @@ std::string table_text(const std::vector<std::vector<std::string>>& rows, std::s
         for (std::size_t c = 0; c < rows[r].size(); ++c) {
             if (width.size() <= c) width.push_back(0), numeric.push_back(true);
             const std::string& cell = rows[r][c];
-            width[c] = std::max(width[c], cell.size());
+            width[c] = std::max(width[c], printable(cell).size());
             if (r > 0 && !cell.empty() && cell != "-" && cell.find_first_of("0123456789") > 1)
                 numeric[c] = false;
         }
@@ -107,8 +123,9 @@ std::string table_text(const std::vector<std::vector<std::string>>& rows, std::s
         std::string line(indent);
         for (std::size_t c = 0; c < row.size(); ++c) {
             if (c > 0) line += "  ";
-            line += numeric[c] ? fmt::format("{:>{}}", row[c], width[c])
-                               : fmt::format("{:<{}}", row[c], width[c]);
+            const std::string cell = printable(row[c]);
+            line +=
+                numeric[c] ? fmt::format("{:>{}}", cell, width[c]) : fmt::format("{:<{}}", cell, width[c]);
         }
         line.erase(line.find_last_not_of(' ') + 1);
         text += line + "\n";
@@ -132,7 +149,8 @@ bool StatusLine::due() const {
 void StatusLine::show(const std::string& text, bool last) {
     if (!shown_ || (!(last && terminal_) && !due())) return;
     last_ = std::chrono::steady_clock::now();
-    std::fputs((terminal_ ? "\r\033[K" + text : text + "\n").c_str(), stderr);
+    const std::string line = printable(text);
+    std::fputs((terminal_ ? "\r\033[K" + line : line + "\n").c_str(), stderr);
 }
 
 std::string text_of_time(double seconds) {

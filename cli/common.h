@@ -18,9 +18,12 @@ namespace squint::cli {
 inline constexpr int kDone = 0, kComparisonFailed = 1, kUsage = 2, kSomeFailed = 3, kInternal = 70,
                      kInterrupted = 130;
 
-/// Writes to standard output.  Throws InputError where that fails.
+/// Writes lines of ASCII to standard output: other characters become \u00FC, control characters become ?.  Throws
+/// InputError where that fails.
 void print(std::string_view text);
-void print_json(const nlohmann::ordered_json& json);
+/// Writes the same to standard error, where nobody hears of a failure.
+void say(std::string_view text);
+void print_json(const nlohmann::ordered_json& json, int indent = 2);
 /// Writes to a file, whole or not at all, or to standard output for -.
 void write_json(const std::string& path, const nlohmann::ordered_json& json);
 

@@ -107,10 +107,8 @@ void show_alike(const CompareArguments& a, Image& x, const Attributes& of_x, Ima
     if (a.srgb)
         throw InputError("--transfer srgb: one picture is encoded already; allowed beside a preview: linear");
     (first ? x : y) = first ? as_preview(x, of_x) : as_preview(y, of_y);
-    std::fputs(fmt::format("note: {} is compared as its preview: over its background, 8-bit sRGB\n",
-                           printable(first ? a.a : a.b))
-                   .c_str(),
-               stderr);
+    say(fmt::format("note: {} is compared as its preview: over its background, 8-bit sRGB\n",
+                    first ? a.a : a.b));
 }
 
 }  // namespace
@@ -138,7 +136,7 @@ int run(const CompareArguments& a) {
                                 {"channels", json_of(comparison)},
                                 {"failed", failed}});
     if (a.json != "-" && !comparison.all.empty()) print(figures_text(comparison, x));
-    for (const std::string& line : failed) std::fputs(fmt::format("squint: {}\n", line).c_str(), stderr);
+    for (const std::string& line : failed) say(fmt::format("squint: {}\n", line));
     return failed.empty() ? kDone : kComparisonFailed;
 }
 

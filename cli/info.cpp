@@ -100,10 +100,8 @@ int run(const VolumeArguments& a) {
     std::vector<std::string> notes;
     const auto volume = load(scene_of_volume(a.volume, a.overrides), notes);
     save_nrrd(*volume, a.output);
-    std::fputs(fmt::format("{}: {}x{}x{} voxels of {} bits from {}\n", a.output, volume->dims.x,
-                           volume->dims.y, volume->dims.z, 8 * volume->scalar_bytes(), volume->name)
-                   .c_str(),
-               stderr);
+    say(fmt::format("{}: {}x{}x{} voxels of {} bits from {}\n", a.output, volume->dims.x, volume->dims.y,
+                    volume->dims.z, 8 * volume->scalar_bytes(), volume->name));
     return kDone;
 }
 

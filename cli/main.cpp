@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/text.h"
 
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -60,7 +61,7 @@ void handle(int signal, void (*handler)(int)) {
 }
 
 int report(int code, const char* kind, const char* what) {
-    std::fprintf(stderr, "squint: %s%s\n", kind, message_text(what).c_str());
+    say(fmt::format("squint: {}{}\n", kind, message_text(what)));
     return code;
 }
 

@@ -88,11 +88,11 @@ int run(const NumberArguments& a) {
         // A wrong line gets a line of output, too: the others still get their answers.
         if (const std::string wrong = calculate({line}, c); !wrong.empty()) {
             any_wrong = true;
-            print(a.json ? nlohmann::ordered_json{{"error", printable(wrong)}}.dump() + "\n" : "error\n");
-            std::fputs(message_text(fmt::format("squint: standard input:{}: {}", number, wrong))
-                           .append("\n")
-                           .c_str(),
-                       stderr);
+            if (a.json)
+                print_json({{"error", printable(wrong)}}, -1);
+            else
+                print("error\n");
+            say(message_text(fmt::format("squint: standard input:{}: {}", number, wrong)) + "\n");
             continue;
         }
         print(a.json ? as_json(c) : for_programs(c));

@@ -219,7 +219,7 @@ Json render_frame(const Job& job, int frame) {
         options.progress = nullptr;
         bar.reset();
         if (a.error) {
-            if (!a.quiet) std::fputs(price_of_errors(plan, rendering.statistics).c_str(), stderr);
+            if (!a.quiet) say(price_of_errors(plan, rendering.statistics));
             errors = rounding_errors(plan, rendering.image, options, frame);
         }
         if (a.bound)
@@ -252,20 +252,18 @@ Json render_frame(const Job& job, int frame) {
     const std::vector<std::string> warnings = warnings_of(plan, rendering);
     if (!a.quiet) {
         const RenderStatistics& s = rendering.statistics;
-        std::fputs(
-            fmt::format("{}: {}x{} pixels, {} ({}), {:.2f} s, {} samples on {} rays, {} thread{}\n",
+        say(fmt::format("{}: {}x{} pixels, {} ({}), {:.2f} s, {} samples on {} rays, {} thread{}\n",
                         !exr.empty()             ? exr
                         : !png.empty()           ? png
                         : job.scene.name.empty() ? "built-in scene"
                                                  : job.scene.name,
                         plan.camera.width, plan.camera.height, s.path, s.why, s.seconds,
-                        text_of_count(s.samples), text_of_count(s.rays), s.threads, s.threads == 1 ? "" : "s")
-                .c_str(),
-            stderr);
+                        text_of_count(s.samples), text_of_count(s.rays), s.threads,
+                        s.threads == 1 ? "" : "s"));
         for (const std::string& warning : warnings)
-            std::fputs(fmt::format("  warning: {}\n", message_text(warning)).c_str(), stderr);
-        if (measured) std::fputs(error_text(errors).c_str(), stderr);
-        if (a.bound) std::fputs(bound_text(certificate).c_str(), stderr);
+            say(fmt::format("  warning: {}\n", message_text(warning)));
+        if (measured) say(error_text(errors));
+        if (a.bound) say(bound_text(certificate));
     }
     if (a.options.audit && a.json != "-") print(audit_text(plan, rendering.statistics));
     Json record = json_of(plan, rendering, measured ? &errors : nullptr, a.options.audit);
@@ -323,13 +321,11 @@ int run(const RenderArguments& a) {
     const auto volume = load_and_complete(a.scene, scene, notes, a.max_memory);
     const Job job{a, scene, volume, output, preview};
     if (!a.quiet)
-        for (const std::string& note : notes)
-            std::fputs(fmt::format("  note: {}\n", message_text(note)).c_str(), stderr);
+        for (const std::string& note : notes) say(fmt::format("  note: {}\n", message_text(note)));
 
     Json pictures = Json::array();
     for (int frame = 0; frame < scene.camera.turntable; ++frame) pictures.push_back(render_frame(job, frame));
-    if (scene.camera.turntable > 1 && !a.quiet && !(output.empty() && preview.empty()))
-        std::fputs(film_line(job).c_str(), stderr);
+    if (scene.camera.turntable > 1 && !a.quiet && !(output.empty() && preview.empty())) say(film_line(job));
     if (a.json.empty()) return kDone;
     Json record{{"schema", "squint.render/2"},
                 {"version", version()},

@@ -21,13 +21,13 @@ int run(const ReportArguments& a) {
         const std::string path =
             a.output.empty() ? (std::filesystem::path(a.run) / "report.html").string() : a.output;
         write_text_whole(path, report_html(data, a.run, a.most_picture_bytes));
-        std::fputs(fmt::format("{}: {} points\n", path, data["entries"].size()).c_str(), stderr);
+        say(fmt::format("{}: {} points\n", path, data["entries"].size()));
         return kDone;
     }
     const std::string text = a.format == "csv" ? report_csv(data)
                              : a.format == "markdown"
                                  ? report_markdown(data)
-                                 : data.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+                                 : data.dump(1, ' ', true, Json::error_handler_t::replace) + "\n";
     if (a.output.empty() || a.output == "-")
         print(text);
     else

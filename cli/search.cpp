@@ -112,7 +112,7 @@ int run(const SearchArguments& a) {
     StatusLine line(!a.quiet);
     settings.progress = [&](const std::string& text) { line.show(text); };
     settings.note = [&](const std::string& note) {
-        if (!a.quiet) line.clear(), std::fputs(fmt::format("note: {}\n", note).c_str(), stderr);
+        if (!a.quiet) line.clear(), say(fmt::format("note: {}\n", note));
     };
     const Interruptible here;
     if (a.guarantee == "pictures") {

@@ -23,10 +23,8 @@ std::string text_of(const Progress& p) {
 
 int join(const SweepArguments& a) {
     const Collected c = collect(a.files, a.output);
-    std::fputs(fmt::format("{}: {} points, {} of them different: {} copied, {} missing, {} failed\n",
-                           a.output, c.points, c.distinct, c.copied, c.missing, c.failed)
-                   .c_str(),
-               stderr);
+    say(fmt::format("{}: {} points, {} of them different: {} copied, {} missing, {} failed\n", a.output,
+                    c.points, c.distinct, c.copied, c.missing, c.failed));
     return c.missing + c.failed > 0 ? kSomeFailed : kDone;
 }
 
@@ -59,25 +57,19 @@ int run(const SweepArguments& a) {
         if (line.due() || p.done == p.total) line.show(text_of(p), p.done == p.total);
     };
     options.note = [&](const std::string& note) {
-        if (!a.quiet) std::fputs(fmt::format("note: {}\n", note).c_str(), stderr);
+        if (!a.quiet) say(fmt::format("note: {}\n", note));
     };
-    if (a.json_lines)
-        options.finished = [](const Json& record) {
-            print(record.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
-        };
+    if (a.json_lines) options.finished = [](const Json& record) { print_json(record, -1); };
     const Interruptible here;
     if (a.dry_run) return say_forecast(sweep, options);
     const RunSummary s = run_sweep(sweep, options);
     line.clear();
     if (!a.quiet)
-        std::fputs(
-            fmt::format("{}: {} points, {} of them different: {} computed, {} there already, {} failed; {}\n",
+        say(fmt::format("{}: {} points, {} of them different: {} computed, {} there already, {} failed; {}\n",
                         a.output, s.points, s.distinct, s.computed, s.reused, s.failed,
-                        text_of_time(s.seconds))
-                .c_str(),
-            stderr);
+                        text_of_time(s.seconds)));
     if (!a.quiet && !s.first_failure.empty())
-        std::fputs(fmt::format("the first that failed: {}\n", s.first_failure).c_str(), stderr);
+        say(fmt::format("the first that failed: {}\n", s.first_failure));
     return s.failed > 0 ? kSomeFailed : kDone;
 }
 

@@ -32,6 +32,80 @@ TEST_F(Verbs, EachHasHelpWithAnExample) {
     }
 }
 
+// Names of files come back in what every verb prints, text and JSON, well and ill: bytes of 0x80 and more and control
+// characters, which move a terminal's cursor and set its colours, never do.
+TEST_F(Verbs, NoneSendsATerminalWhatItWouldObey) {
+    const std::string odd =
+        "Pr\xc3\xbc"
+        "fung \x9b"
+        "31m\x1b[2J\xf0\x9f\x94\xa5";
+    fs::create_directory(folder / odd);
+    const std::string sweep =
+        "[base]\nvolume.dims = 8\nimage.width = 4\nimage.height = 4\n[[axis]]\nwires = ['color']\n"
+        "fraction_bits = [4, 9]\n";
+    write(odd + "/s.toml", sweep);
+    ASSERT_EQ(squint("volume phantom -o v.nrrd --set volume.dims=8").code, 0);
+    fs::copy(folder / "v.nrrd", folder / odd / "v.nrrd");
+    const std::string at = "'" + odd + "/", scene = at + "o.toml'", volume = at + "v.nrrd'",
+                      picture = at + "p.exr'";
+    const std::vector<std::string> lines{
+        "render --size 4x4 -o " + picture + kSmall,
+        "render " + volume + " -o " + picture,
+        "render " + volume + " --print-scene >" + scene + "; cat " + scene,
+        "render " + scene + " -o " + picture + " --error --reference --json -",
+        "render " + at + "none.toml'",
+        "plan " + volume,
+        "plan --json " + volume,
+        "plan --brief " + volume,
+        "pixel " + volume + " 3 3",
+        "info " + volume,
+        "info --json " + volume,
+        "info " + at + "none.nrrd'",
+        "volume " + volume + " -o " + at + "w.nrrd'",
+        "compare " + picture + " " + picture,
+        "compare " + picture + " " + at + "none.exr' --json -",
+        "compare " + picture + " " + picture + " --json -",
+        "number " + at + "'",
+        "number --json u1.15 " + at + "'",
+        "sweep " + at + "s.toml' --dry-run -o " + at + "run'",
+        "sweep " + at + "s.toml' -o " + at + "run'",
+        "sweep " + at + "s.toml' --json-lines -o " + at + "run2'",
+        "sweep --collect " + at + "run' -o " + at + "all'",
+        "report " + at + "run'",
+        "report --format html " + at + "run'",
+        "report --format csv " + at + "run'",
+        "report --format markdown " + at + "run'",
+        "report " + at + "none'",
+        "search " + scene + " --max-error 99 -o " + at + "search'",
+        "table " + volume + " -o " + at + "t.csv'",
+        "hard " + at + "o.toml'",
+        "hard --json " + at + "o.toml'",
+        "hard " + at + "none'",
+        "doctor " + at + "'",
+        "help " + at + "'",
+        "--" + odd.substr(0, 3) + "\xc3\xbc",
+        at + "'",
+        "render --set " + at + "=1'",
+        "render --set 'volume.file=" + odd + "'",
+    };
+    int told = 0;
+    for (const std::string& line : lines) {
+        const Outcome outcome = squint(line);
+        for (const std::string& text : {outcome.out, outcome.err}) {
+            const auto obeyed = std::find_if(text.begin(), text.end(), [](char c) {
+                return c != '\n' &&
+                       (static_cast<unsigned char>(c) < 0x20 || static_cast<unsigned char>(c) > 0x7e);
+            });
+            EXPECT_EQ(obeyed, text.end()) << line << "\n" << std::string(obeyed, text.end()).substr(0, 80);
+            told += text.find("Pr\\u00FCfung") != std::string::npos ||
+                    text.find("Pr\\u00fcfung") != std::string::npos;
+        }
+        EXPECT_TRUE(outcome.code >= 0 && outcome.code <= 3)
+            << line << ": " << outcome.code << ' ' << outcome.err;
+    }
+    EXPECT_GT(told, 20) << "names do not come back: nothing was tested";
+}
+
 TEST_F(Verbs, UsageErrorsExitWith2) {
     expect_refusal(squint("rendr"), "unknown verb \"rendr\"; did you mean \"render\"?");
     expect_refusal(squint("rendr --size 3x3"), "did you mean \"render\"?");
