@@ -347,9 +347,19 @@ void add_hard(CLI::App& app, HardArguments& a) {
                     "Scene files, and folders of them; default: the cases of configs/hard")
         ->type_name("SCENE.toml|FOLDER");
     add_set(verb, a.overrides, "Set a key of every scene; may be repeated, the last wins");
+    verb.add_option("--views", a.views,
+                    "Whole pictures instead of slabs, from so many sides: words against the same in double")
+        ->check(CLI::Range(1, 1000))
+        ->type_name("N");
+    verb.add_option("--sizes", a.sizes, "Pixels a side of these pictures")
+        ->check(CLI::Range(1, 4096))
+        ->delimiter(',')
+        ->type_name("N,...")
+        ->default_str("16,24");
     add_json_flag(verb, a.json);
     verb.footer(
-        "Examples:\n  squint hard\n  squint hard configs/hard/spike.toml --set precision.preset=wide");
+        "Examples:\n  squint hard\n  squint hard configs/hard/spike.toml --set precision.preset=wide\n"
+        "  squint hard --views 64");
 }
 
 void add_table(CLI::App& app, TableArguments& a) {

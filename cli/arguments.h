@@ -65,6 +65,8 @@ struct DoctorArguments {
 struct HardArguments {
     std::vector<std::string> scenes;  // files and folders
     std::vector<std::string> overrides;
+    int views = 0;  // 0: slabs alone, no pictures
+    std::vector<int> sizes{16, 24};
     bool json = false;
 };
 struct TableArguments {

@@ -1,10 +1,13 @@
 // squint hard: scenes with transfer functions that are hard to classify, each with every method: the error of
-// one slab against the exact integral, or why the method is refused.
+// one slab against the exact integral, or of whole pictures against the same in double, or why the method is
+// refused.
 #include "cli/common.h"
 #include "core/error.h"
+#include "truth/picture_check.h"
 #include "truth/slab_check.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
@@ -57,13 +60,19 @@ std::vector<Case> cases_of(const HardArguments& a) {
 
 struct Outcome {
     SlabCheck check;
+    PictureCheck pictures;
     std::string refused;             // the reason, or empty
     std::vector<std::string> notes;  // what the tables' builder decided
 };
-Outcome outcome_of(Scene scene, const NamedMethod& method, const std::shared_ptr<const Volume>& volume) {
+Outcome outcome_of(const HardArguments& a, Scene scene, const NamedMethod& method,
+                   const std::shared_ptr<const Volume>& volume) {
     scene.classification.method = method.method, scene.classification.order = method.order;
     Outcome outcome;
     try {
+        if (a.views > 0) {
+            outcome.pictures = check_pictures(scene, volume, a.views, a.sizes);
+            return outcome;
+        }
         const Plan plan = plan_asked_for(scene, volume);
         outcome.check = check_slabs(plan), outcome.notes = plan.notes;
     } catch (const InputError& error) {
@@ -72,13 +81,18 @@ Outcome outcome_of(Scene scene, const NamedMethod& method, const std::shared_ptr
     return outcome;
 }
 
-std::string cell_of(const Outcome& outcome) {
+std::string cell_of(const HardArguments& a, const Outcome& outcome) {
     if (!outcome.refused.empty()) return "refused";
+    if (a.views > 0) return fmt::format("{:.2f}", outcome.pictures.largest);
     return fmt::format("{:.2f}{}", std::max(outcome.check.largest_color, outcome.check.largest_alpha),
                        outcome.check.beyond ? "!" : "");
 }
-Json json_of(const Outcome& outcome) {
+Json json_of(const HardArguments& a, const Outcome& outcome) {
     if (!outcome.refused.empty()) return {{"refused", outcome.refused}};
+    const PictureCheck& p = outcome.pictures;
+    if (a.views > 0)
+        return {
+            {"rounding_lsb8", p.largest}, {"view", p.view}, {"size", p.size}, {"pixel", {p.column, p.row}}};
     return {{"slabs", outcome.check.slabs},
             {"color_lsb8", outcome.check.largest_color},
             {"alpha_lsb8", outcome.check.largest_alpha},
@@ -100,9 +114,9 @@ int run(const HardArguments& a) {
         const auto volume = load(scene, notes);
         rows.push_back({name});
         for (const NamedMethod& method : methods) {
-            const Outcome outcome = outcome_of(scene, method, volume);
-            rows.back().push_back(cell_of(outcome));
-            json[name][method.name] = json_of(outcome);
+            const Outcome outcome = outcome_of(a, scene, method, volume);
+            rows.back().push_back(cell_of(a, outcome));
+            json[name][method.name] = json_of(a, outcome);
             beyond += outcome.check.beyond;
             if (!outcome.refused.empty())
                 remarks += fmt::format("{}, {}: {}\n", name, method.name, outcome.refused);
@@ -114,10 +128,16 @@ int run(const HardArguments& a) {
     if (a.json) {
         print_json({{"schema", "squint.hard/1"}, {"scenes", json}});
     } else {
-        print(
-            "Largest error of one slab against the exact integral, colour or opacity, in LSB8 (! outside "
-            "0 <= C <= alpha <= 1)\n\n" +
-            table_text(rows) + (remarks.empty() ? "" : "\n" + remarks));
+        const std::string head =
+            a.views > 0
+                ? fmt::format(
+                      "Largest error of any pixel's colour or opacity, words against the same in double, in "
+                      "LSB8: {} views, {} pixels a side\n\n",
+                      a.views, fmt::join(a.sizes, " and "))
+                : "Largest error of one slab against the exact integral, colour or opacity, in LSB8 (! "
+                  "outside "
+                  "0 <= C <= alpha <= 1)\n\n";
+        print(head + table_text(rows) + (remarks.empty() ? "" : "\n" + remarks));
     }
     return beyond ? kComparisonFailed : kDone;
 }
