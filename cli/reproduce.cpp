@@ -87,12 +87,9 @@ std::vector<Order> orders_of(const std::vector<Paper>& papers, const ReproduceAr
             if (!figure.timed || a.timed)
                 orders.push_back({&paper, &figure});
             else if (!a.quiet)
-                std::fputs(
-                    fmt::format(
-                        "{} {}: left out, it measures time and takes {}; --timed, or its name, makes it\n",
-                        paper.name, figure.name, text_of_time(figure.seconds))
-                        .c_str(),
-                    stderr);
+                say(fmt::format(
+                    "{} {}: left out, it measures time and takes {}; --timed, or its name, makes it\n",
+                    paper.name, figure.name, text_of_time(figure.seconds)));
         }
     };
     if (a.paper == "all") {
@@ -133,8 +130,7 @@ Result made(const Order& order, const ReproduceArguments& a) {
     const auto& [paper, figure] = order;
     const std::string name = paper->name + " " + figure->name;
     if (!a.quiet && figure->seconds >= 60)
-        std::fputs(fmt::format("{}: about {} on two cores\n", name, text_of_time(figure->seconds)).c_str(),
-                   stderr);
+        say(fmt::format("{}: about {} on two cores\n", name, text_of_time(figure->seconds)));
     Progress progress(!a.quiet, name);
     Settings settings;
     settings.folder = a.output + "/" + paper->name;
@@ -147,10 +143,8 @@ Result made(const Order& order, const ReproduceArguments& a) {
     Result result = make(*paper, *figure, settings);
     progress.clear();
     if (!a.quiet)
-        std::fputs(fmt::format("{}: {} made, {} there already, in {}/{}\n", name, result.made, result.kept,
-                               settings.folder, figure->name)
-                       .c_str(),
-                   stderr);
+        say(fmt::format("{}: {} made, {} there already, in {}/{}\n", name, result.made, result.kept,
+                        settings.folder, figure->name));
     return result;
 }
 

@@ -94,8 +94,7 @@ std::string summary(const search::Settings& s, const search::CertifiedResult& r)
 /// What a search ends with: its summary or record, or why there is none.
 template <class Result>
 int told(const SearchArguments& a, const search::Settings& settings, const Result& result) {
-    if (!result.failure.empty())
-        return std::fputs(fmt::format("squint: {}\n", result.failure).c_str(), stderr), kComparisonFailed;
+    if (!result.failure.empty()) return say(fmt::format("squint: {}\n", result.failure)), kComparisonFailed;
     if (a.json)
         print_json(result.json);
     else if (!a.quiet)
