@@ -166,6 +166,37 @@ TEST(InsideRules, SeeThinMatterAlikeFromBothSides) {
     });
 }
 
+// A thin ridge between two samples turns the normal round: of slabs a voxel long, pieces find the light of slabs of
+// a sixteenth, wherever the ridge stands.
+TEST(InsideRules, PiecesFindTheLightOfAThinRidge) {
+    double of_mean = 0, of_pieces = 0;
+    for (double place = 16.05; place < 17; place += 0.1) {
+        const ProceduralField ridge{"ridge",
+                                    "",
+                                    12,
+                                    33,
+                                    [=](const Vec3& p) {
+                                        const double x = (p.x * 32 - place) / 2;
+                                        return 1 / (1 + x * x);
+                                    },
+                                    [](const Vec3&) { return Vec3(); }};
+        const auto light = [&](const char* rule, const char* step) {
+            const Image image = picture_of(
+                plan_with("pips", rule,
+                          {"camera.azimuth=90", "camera.elevation=0", "precision.preset=real",
+                           "lights=[{headlight=true}]", std::string("sampling.step=") + step,
+                           "transfer_function.points=[[0,1,1,1,0],[2000,1,1,1,0],[3900,1,1,1,0.4]]"},
+                          &ridge));
+            return double{image.find("R")->values[static_cast<std::size_t>(12 * 24 + 12)]};
+        };
+        const double truth = light("mean", "0.0625");
+        ASSERT_GT(truth, 0.1);
+        of_mean += std::pow(light("mean", "1") - truth, 2);
+        of_pieces += std::pow(light("adaptive", "1") - truth, 2);
+    }
+    EXPECT_LT(2 * std::sqrt(of_pieces), std::sqrt(of_mean));
+}
+
 TEST(InsideRules, AreRefusedWhereAMethodHasNoTablesForThem) {
     for (const char* method : {"pi2d", "pi1d"}) try {
             plan_with(method, "adaptive", {});
