@@ -58,6 +58,13 @@ requires std::same_as<W, Bounded> W word_from(double value, const Spec& spec, co
     return with_error(raw, Shares::one(to.wire, rounding_of(off, spec.rounding)));
 }
 
+/// A word of zero stands for one; without rounding it may be anything that its error allows, and stays what it is.
+template <class W, class N>
+requires std::same_as<W, Bounded> N divisor(const N& x) {
+    if (x.exact || x.v > 0) return x.v > 0 ? x : constant<Bounded>(1);
+    return {1, false, x.error + Shares::one(-1, 1)};
+}
+
 /// The trilinear field is continuous over cell faces: a location that errs is a displacement of the point, not a
 /// matter of cells.  The word's cell is the cell; the weight carries the displacement.
 inline CellPosition<Bounded> cell_position(const LocationStage& s, const std::array<Bounded, 3>& location) {
@@ -219,12 +226,18 @@ struct Interval {
     double from(double x) const { return std::max(high - x, x - low); }
 };
 
+/// The length of a full slab that the method's tables are built for: one scalar stands for a projection's ray, with its
+/// opacity as declared.
+double full_step(const Plan& plan) {
+    return plan.projection_mode ? plan.entries.unit_distance : plan.step_world;
+}
+
 /// The function as no word has it: extinction of a full step and colour, linear between entries; opaque entries.
 class Function {
   public:
     explicit Function(const Plan& plan) {
         for (const Entry& entry : plan.entries.entry) {
-            curve_[3].push_back(entry.extinction * plan.step_world);
+            curve_[3].push_back(entry.extinction * full_step(plan));
             for (int c = 0; c < 3; ++c) curve_[static_cast<std::size_t>(c)].push_back(entry.color[c]);
             opaque_.push_back(entry.opaque);
             has_opaque_ = has_opaque_ || entry.opaque;
@@ -817,9 +830,6 @@ std::optional<std::string> what_is_not_bounded(const Plan& plan) {
     if (is_series && plan.entries.any_opaque() && !plan.scene.classification.opaque_prediction)
         return "opaque entries without classification.opaque_prediction are not bounded yet; allowed: true";
     if (plan.lit) return "light is not bounded yet; allowed: shading.model none, or no lights";
-    if (plan.projection_mode)
-        return fmt::format("compositing.mode {} is not bounded yet; allowed: over",
-                           name_of(plan.scene.compositing.mode));
     if (plan.interpolation.nearest)
         return "sampling.interpolation nearest jumps from voxel to voxel; allowed: trilinear";
     return {};
@@ -855,7 +865,7 @@ Certificate certify(const Plan& plan, const CertificateOptions& options) {
         const auto& series = std::get<PowerSeriesOfOrder1>(plan.method);
         preintegration::ExactSeries exact = preintegration::build_exact_series(
             plan.entries, 1, false, plan.scene.classification.opaque_prediction);
-        exact.step = plan.step_world;
+        exact.step = full_step(plan);
         certify_all(BoundedPowerSeries{series, function, exact});
     }
     if (stopped) throw Cancelled{};

@@ -117,6 +117,7 @@ Case draw_case(unsigned seed) {
     scene.classification.order = 1;
     if (draw.once_in(5)) scene.classification.encoding = AlphaEncoding::sqrt_alpha;
     scene.compositing.form = draw.any_of<CompositingForm>();
+    if (draw.once_in(6)) scene.compositing.mode = draw.any_of<CompositingMode>();
     scene.precision.preset = draw.one_of<const char*>({"default", "default", "squeeze", "eight_bit", "wide"});
     Plan plan = make_plan(scene, volume);
     if (draw.once_in(3)) return {scene, std::move(plan)};
@@ -274,7 +275,6 @@ TEST(Certificate, RefusesWhatItDoesNotBoundInOneLine) {
     const std::string dark = "lights=[]", pc = "classification.method=pc", small = "volume.dims=8";
     EXPECT_THAT(refusal({small, pc}), HasSubstr("--bound: light is not bounded yet"));
     EXPECT_THAT(refusal({small, dark, "classification.method=leg"}), HasSubstr("classification.method leg"));
-    EXPECT_THAT(refusal({small, dark, pc, "compositing.mode=mip"}), HasSubstr("compositing.mode mip"));
     EXPECT_THAT(refusal({small, dark, pc, "sampling.interpolation=nearest"}),
                 HasSubstr("jumps from voxel to voxel"));
     EXPECT_THAT(refusal({small, dark, pc, "precision.preset=real"}), HasSubstr("real rounds nothing"));
