@@ -1,4 +1,4 @@
-# Includes run one way: fixedpoint, core <- scene <- pipeline <- truth <- studies <- cli, bench.  Inside pipeline
+# Includes run one way: fixedpoint, core <- scene <- pipeline <- truth <- studies <- cli, python, bench.  Inside pipeline
 # the stages, the methods and the plan know no machine.  Highway stays in -inl.h files, in machines and in files
 # compiled once per target; a header with data includes neither.
 #   cmake -DSOURCE=<tree> -P tests/dependencies.cmake
@@ -11,6 +11,7 @@ set(may_pipeline ${may_scene} pipeline)
 set(may_truth ${may_pipeline} truth)
 set(may_studies ${may_truth} studies)
 set(may_cli ${may_studies} cli)
+set(may_python ${may_studies} python)
 set(may_bench ${may_studies} bench tests)  # scenes that tests draw are timed, too
 
 set(wrong "")
@@ -19,7 +20,7 @@ macro(complain file what)
 endmacro()
 
 set(looked_at 0)
-foreach(room fixedpoint core scene pipeline truth studies cli bench)
+foreach(room fixedpoint core scene pipeline truth studies cli python bench)
   file(GLOB_RECURSE files RELATIVE ${SOURCE} ${SOURCE}/${room}/*.h ${SOURCE}/${room}/*.cpp)
   foreach(file ${files})
     math(EXPR looked_at "${looked_at} + 1")
