@@ -160,12 +160,14 @@ InsideRule inside_rule(Plan& plan) {
         return InsideRule::front;
     }
     const bool has_parts = std::visit([](const auto& m) { return !m.kPremultiplied; }, plan.method);
+    const bool has_fades = plan.scene.classification.method == Method::pi2d;
     if (asked == InsideRule::adaptive && !has_parts)
-        throw InputError(fmt::format(
-            "{}: found \"adaptive\", but {} has no tables for parts of a slab; allowed: mean, front, middle, "
-            "or classification.method = \"pips\" or \"leg\"",
-            where(plan.scene, "shading.inside"), method));
-    if (asked && lights_fade(*asked) && plan.scene.classification.method != Method::pi2d)
+        throw InputError(
+            fmt::format("{}: found \"adaptive\", but {} has no tables for parts of a slab; allowed: mean, "
+                        "front, middle{}, "
+                        "or classification.method = \"pips\" or \"leg\"",
+                        where(plan.scene, "shading.inside"), method, has_fades ? ", linear, nlpi" : ""));
+    if (asked && lights_fade(*asked) && !has_fades)
         throw InputError(fmt::format(
             "{}: found \"{}\", but {} has no tables of where light lies in a slab; allowed: mean, front, "
             "middle{}, or classification.method = \"pi2d\"",
