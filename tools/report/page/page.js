@@ -17,7 +17,7 @@ function about() {
 function draw() {
   const timed = points.some((p) => p.ms !== undefined), model = points.some((p) => p.model);
   $('pareto-hint').textContent = 'Points that no other beats in both are dark and joined. Click one for its picture; drag a box to keep only what is in it, here and below.' + (model ? ' Triangles: timed in the model, since no lane holds these formats.' : '');
-  const measured = `${kFigures[state.figure]} of ${kChannels[state.channel]}, against ${kAgainst[state.against] ?? state.against}`;
+  const figure = kFigures[state.figure], measured = `${figure[0].toUpperCase()}${figure.slice(1)} of ${kChannels[state.channel]}, against ${kAgainst[state.against] ?? state.against}`;
   $('pareto-title').textContent = `${measured}: by ${timed ? 'time and ' : ''}${kCosts[state.cost]}`;
   $('sensitivity-title').textContent = `${measured}: ${wiresVaried() ? 'by the bits of each wire' : 'along each axis'}`;
   $('heat-title').textContent = `${measured}: over two axes`;
