@@ -199,7 +199,9 @@ TEST(TurnedVolume, ARayIsRenderedWhereItIsInTheVolumeAndInTheClipBox) {
                                   voxel[a] <= static_cast<double>(volume->dims[a] - 1) &&
                                   (!scene.clip.low || p[a] >= (*scene.clip.low)[a]) &&
                                   (!scene.clip.high || p[a] <= (*scene.clip.high)[a]);
-                    if (in_both && inside == 0) EXPECT_NEAR(t, ray.entry_distance, kApart);
+                    if (in_both && inside == 0) {
+                        EXPECT_NEAR(t, ray.entry_distance, kApart);
+                    }
                     inside += in_both ? kApart : 0;
                 }
                 const double chord = ray.slabs == 0 ? 0 : (ray.slabs - 1 + ray.last_length) * plan.step_world;
