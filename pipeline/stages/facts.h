@@ -13,8 +13,6 @@
 
 #include "fixedpoint/quantise.h"
 
-#include <hwy/base.h>
-
 #include <cassert>
 #include <string>
 #include <string_view>
@@ -39,7 +37,7 @@ struct Is {
         return s.*kMember == kValue;
     }
     template <class Stage>
-    static HWY_INLINE void promise(Stage& s) {
+    [[gnu::always_inline]] static inline void promise(Stage& s) {
         s.*kMember = kValue;
     }
     static std::string missing() { return std::string(member_name<kMember>()) + " has another value"; }
@@ -53,7 +51,7 @@ struct AtMost {
         return s.*kMember <= kMost;
     }
     template <class Stage>
-    static HWY_INLINE void promise(Stage& s) {
+    [[gnu::always_inline]] static inline void promise(Stage& s) {
         if (s.*kMember > kMost) __builtin_unreachable();
     }
     static std::string missing() { return std::string(member_name<kMember>()) + " is too large"; }
@@ -67,7 +65,7 @@ struct Same {
         return s.*kMember == s.*kOther;
     }
     template <class Stage>
-    static HWY_INLINE void promise(Stage& s) {
+    [[gnu::always_inline]] static inline void promise(Stage& s) {
         s.*kMember = s.*kOther;
     }
     static std::string missing() {
@@ -84,7 +82,7 @@ struct DropsBits {
         return (kBits > 0 ? to.shift == kBits : to.shift > 0) && !to.limits;
     }
     template <class Stage>
-    static HWY_INLINE void promise(Stage& s) {
+    [[gnu::always_inline]] static inline void promise(Stage& s) {
         Rescale& to = s.*kMember;
         to.limits = false;
         if constexpr (kBits > 0) {
@@ -107,7 +105,7 @@ struct DoesNothing {
         return (s.*kMember).shift == 0 && !(s.*kMember).limits;
     }
     template <class Stage>
-    static HWY_INLINE void promise(Stage& s) {
+    [[gnu::always_inline]] static inline void promise(Stage& s) {
         (s.*kMember).limits = false, (s.*kMember).shift = 0;
     }
     static std::string missing() {
@@ -123,7 +121,7 @@ struct DropsBitsUnless {
         return (s.*kMember).shift > 0 && (s.*kIdle || !(s.*kMember).limits);
     }
     template <class Stage>
-    static HWY_INLINE void promise(Stage& s) {
+    [[gnu::always_inline]] static inline void promise(Stage& s) {
         DropsBits<kMember>::promise(s);
     }
     static std::string missing() { return DropsBits<kMember>::missing(); }
@@ -139,7 +137,7 @@ struct DropsBitsBeforeClamp {
         return to.shift > 0 && !to.wraps && to.lowest <= 0 && to.highest >= std::int64_t{1} << s.*kFraction;
     }
     template <class Stage>
-    static HWY_INLINE void promise(Stage& s) {
+    [[gnu::always_inline]] static inline void promise(Stage& s) {
         DropsBits<kMember>::promise(s);
     }
     static std::string missing() {
@@ -155,7 +153,7 @@ struct Rounds {
         return (s.*kMember).rounding == kRounding;
     }
     template <class Stage>
-    static HWY_INLINE void promise(Stage& s) {
+    [[gnu::always_inline]] static inline void promise(Stage& s) {
         (s.*kMember).rounding = kRounding;
     }
     static std::string missing() { return std::string(member_name<kMember>()) + " rounds otherwise"; }
@@ -173,7 +171,7 @@ struct Facts {
         return text;
     }
     /// Only of a stage of which they hold.  `copy`: the caller's own, so that nothing it stores can change it.
-    static HWY_INLINE void assume(Stage& copy) {
+    [[gnu::always_inline]] static inline void assume(Stage& copy) {
         assert(hold(copy));
         (Each::promise(copy), ...);
     }
