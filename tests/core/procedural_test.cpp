@@ -23,7 +23,7 @@ TEST(Procedural, HasTheFieldsOfTheSceneReference) {
     std::vector<std::string> names;
     for (const ProceduralField& field : procedural_fields()) names.push_back(field.name);
     EXPECT_THAT(names, ElementsAre("phantom", "sphere", "marschner_lobb", "shells", "ramp", "constant", "fog",
-                                   "polynomial"));
+                                   "polynomial", "noisy_sphere"));
     EXPECT_EQ(find_procedural("sphare"), nullptr);
 }
 
@@ -74,7 +74,7 @@ TEST_P(EveryField, GradientsAreFiniteAtTheMiddleAndTheCorners) {
 
 INSTANTIATE_TEST_SUITE_P(Fields, EveryField,
                          testing::Values("phantom", "sphere", "marschner_lobb", "shells", "ramp", "constant",
-                                         "fog", "polynomial"),
+                                         "fog", "polynomial", "noisy_sphere"),
                          [](const auto& test) { return test.param; });
 
 TEST(Procedural, ScalarsAreTheRoundedValuesAtVoxelCentres) {
