@@ -2,10 +2,12 @@
 #include "pipeline/record.h"
 #include "pipeline/render.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <memory>
 #include <string>
+#include <tuple>
 #include <vector>
 
 namespace squint {
@@ -44,21 +46,36 @@ TEST(LaneRenderer, TakesTheSameBitsFromCellsWhateverRoomTheyHave) {
         }
 }
 
-// A difference of 12-bit voxels fits 32-bit lanes' factors, with 24 fraction bits it does not fit 32-bit
-// words.
-TEST(LaneRenderer, KeepsGradientsThatAreWiderThan32Bits) {
-    for (const char* method : {"pc", "pips"}) {
-        const std::vector<std::string> steep{"volume.procedural=shells",
-                                             "volume.dims=32",
-                                             "precision.gradient=s12.24",
-                                             std::string("classification.method=") + method,
-                                             "image.width=48",
-                                             "image.height=48"};
-        RenderOptions options;
-        options.path = Path::model;
-        const std::string expected = picture_hash(rendered(steep, options).image);
-        options.path = Path::lanes;
-        EXPECT_EQ(picture_hash(rendered(steep, options).image), expected) << method;
+// A lane holds 31 bits and a sign; the sum of a slab's two ends has one bit more than a gradient.
+TEST(LaneRenderer, LeavesGradientsThatAreWiderThanALaneToTheModel) {
+    const auto with = [](const char* gradient, const char* method) {
+        return std::vector<std::string>{"volume.procedural=shells",
+                                        "volume.dims=32",
+                                        std::string("precision.gradient=") + gradient,
+                                        std::string("classification.method=") + method,
+                                        "image.width=48",
+                                        "image.height=48"};
+    };
+    RenderOptions lanes;
+    lanes.path = Path::lanes;
+    for (const auto& [method, widest, too_wide] :
+         {std::tuple{"pc", "s12.19", "s12.20"}, std::tuple{"pips", "s12.18", "s12.19"}}) {
+        RenderOptions model;
+        model.path = Path::model;
+        EXPECT_EQ(picture_hash(rendered(with(widest, method), lanes).image),
+                  picture_hash(rendered(with(widest, method), model).image))
+            << method;
+        try {
+            rendered(with(too_wide, method), lanes);
+            ADD_FAILURE() << method << ": " << too_wide << " was taken by lanes";
+        } catch (const std::exception& refused) {
+            EXPECT_THAT(refused.what(),
+                        testing::HasSubstr(std::string("gradient: ") + too_wide + " is wider than a lane's"))
+                << method;
+        }
+        EXPECT_EQ(picture_hash(rendered(with(too_wide, method), {}).image),
+                  picture_hash(rendered(with(too_wide, method), model).image))
+            << method;
     }
 }
 
