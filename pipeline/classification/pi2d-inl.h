@@ -77,7 +77,8 @@ HWY_INLINE FadingLight<W> fading_light(const PreIntegrated2D& m, W front, W back
     const CutSlab<W> cut = cut_at_wall(m.prefix, front, back);
     const Slab<W> full = look_up(m, front, cut.end_input), slab = translucent_part(m, cut, full, length);
     const EntryPosition<W> f = node_position(m, front), b = node_position(m, cut.end_input);
-    const auto has_wall = constant<W>(0) < cut.wall, other = is_shorter(m.prefix.entries, length) | has_wall;
+    const auto has_wall = constant<W>(0) < cut.wall;
+    const auto other = is_shorter(m.prefix.entries, length) | has_wall;
     FadingLight<W> light{static_cast<int>(m.fades.size()) + 1, {}, constant<W>(std::int64_t{1} << kWayBits)};
     if (any(has_wall)) {
         const W part = within(quotient(absolute(cut.end_input - front), divisor<W>(cut.span), m.to_way), 0,
