@@ -66,7 +66,8 @@ Entries any_matter(int size, unsigned seed) {
 }
 
 TEST(FadeMoments, OfTablesAreThoseOfEachSlab) {
-    for (const auto& [entries, nodes] : {std::pair{100, 100}, {300, 129}, {40, 161}}) {
+    for (const auto& size : {std::pair{100, 100}, {300, 129}, {40, 161}}) {
+        const int entries = size.first, nodes = size.second;
         const Entries matter = any_matter(entries, 7);
         const auto tables = preintegration::build_fades(matter, nodes, 0.8, false),
                    first = preintegration::build_fades(matter, nodes, 0.8, true);
