@@ -2,6 +2,7 @@
 
 #include "core/portable_math.h"
 #include "pipeline/classification/tables/legendre.h"
+#include "pipeline/classification/tables/pieces.h"
 
 #include <algorithm>
 #include <cmath>
@@ -24,22 +25,17 @@ SlabValue ExactSeries::in_pieces(double front, double back, double length, doubl
     const double rate = length / std::abs(back - front);
     const double start = tables.entry.depth_at(front), end = tables.entry.depth_at(back);
     const double share = std::min(1.0 / pieces, legendre_split_depth(order) / depth);
-    SlabValue result;
-    double through = 1, here = front;
-    for (int piece = 1; piece <= pieces; ++piece) {
+    double here = front;
+    return composited(pieces, depth, 0, [&](int piece) {
         const double target =
             std::clamp(start + (end - start) * share * piece, std::min(start, end), std::max(start, end));
         const double next = piece == pieces ? back
                                             : std::clamp(tables.entry.coordinate_at(target),
                                                          std::min(front, back), std::max(front, back));
         const SlabValue value = one_piece(here, next, rate * std::abs(next - here));
-        result.color += value.color * through;
-        through *= 1 - value.alpha;
         here = next;
-    }
-    result.alpha = -portable::expm1(-depth);
-    if (1 - through > 0) result.color *= result.alpha / (1 - through);
-    return result;
+        return value;
+    });
 }
 
 SlabValue ExactSeries::slab(double front, double back, double length) const {

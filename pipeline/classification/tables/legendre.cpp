@@ -1,6 +1,7 @@
 #include "pipeline/classification/tables/legendre.h"
 
 #include "core/portable_math.h"
+#include "pipeline/classification/tables/pieces.h"
 
 #include <algorithm>
 #include <cassert>
@@ -83,24 +84,17 @@ SlabValue LegendreSeries::in_pieces(double front, double back, double length, do
     const int pieces = static_cast<int>(std::ceil(std::min(depth / split_depth, 1e9)));
     const double rate = length / std::abs(back - front);
     const double start = tables.depth_at(front), end = tables.depth_at(back);
-    SlabValue result;
-    double through = 1;
+    const double share = -portable::expm1(-depth / pieces);
     double here = front;
-    for (int piece = 1; piece <= pieces && through >= kSpent; ++piece) {
+    return composited(pieces, depth, kSpent, [&](int piece) {
         const double target = start + (end - start) * (static_cast<double>(piece) / pieces);
         const double next = piece == pieces ? back : tables.coordinate_at(target);
         // A piece thinner than a rounding of its coordinate is a point of that depth.
-        const double share = -portable::expm1(-depth / pieces);
         const SlabValue value = next == here ? SlabValue{color_at(entries, here / per_entry) * share, share}
                                              : one_piece(here, next, rate * std::abs(next - here));
-        result.color += value.color * through;
-        through *= 1 - value.alpha;
         here = next;
-    }
-    result.alpha = -portable::expm1(-depth);
-    // What lies behind the last piece is at most kSpent: it gets the colour so far.
-    if (1 - through > 0) result.color *= result.alpha / (1 - through);
-    return result;
+        return value;
+    });
 }
 
 SlabValue LegendreSeries::slab(double front, double back, double length) const {
