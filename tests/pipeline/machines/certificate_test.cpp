@@ -8,6 +8,7 @@
 #include "core/volume_source.h"
 #include "pipeline/record.h"
 #include "pipeline/render.h"
+#include "tests/pipeline/machines/draw.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -17,48 +18,13 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <random>
 #include <string>
 
 namespace squint {
 namespace {
 
-class Draw {
-  public:
-    explicit Draw(unsigned seed) : random_(seed) {}
-    int between(int low, int high) {
-        return low + static_cast<int>(random_() % static_cast<unsigned>(high - low + 1));
-    }
-    bool once_in(int n) { return between(1, n) == 1; }
-    double real(double low, double high) {
-        return low + (high - low) * static_cast<double>(random_() >> 11) * 0x1p-53;
-    }
-    template <class T>
-    T one_of(std::initializer_list<T> values) {
-        return values.begin()[between(0, static_cast<int>(values.size()) - 1)];
-    }
-    template <class E>
-    E any_of() {
-        return static_cast<E>(between(0, static_cast<int>(std::size(EnumNames<E>::names)) - 1));
-    }
-
-  private:
-    std::mt19937_64 random_;
-};
-
-double noise_at(const Vec3& p) {
-    auto bits = static_cast<std::uint64_t>(p.x * 1e6) * 0x9e3779b97f4a7c15u ^
-                static_cast<std::uint64_t>(p.y * 1e6) * 0xc2b2ae3d27d4eb4fu ^
-                static_cast<std::uint64_t>(p.z * 1e6) * 0x165667b19e3779f9u;
-    bits = (bits ^ bits >> 31) * 0xbf58476d1ce4e5b9u;
-    return static_cast<double>((bits ^ bits >> 29) >> 11) * 0x1p-53;
-}
-
 std::shared_ptr<const Volume> draw_volume(Draw& draw, Scene& scene) {
-    static const ProceduralField noise{"noise", "", 8, 16, noise_at, [](const Vec3&) { return Vec3(); }};
-    const auto& fields = procedural_fields();
-    const auto which = static_cast<std::size_t>(draw.between(0, static_cast<int>(fields.size())));
-    const ProceduralField& field = which < fields.size() ? fields[which] : noise;
+    const ProceduralField& field = draw_field(draw, 1);
     const Index3 dims{draw.between(2, 20), draw.between(2, 20), draw.between(2, 20)};
     const int bits = draw.one_of({8, 8, 12, 5});
     const Vec3 spacing = draw.once_in(2) ? Vec3(1, 1, 1) : Vec3(draw.real(0.4, 2), draw.real(0.4, 2), 1);
@@ -74,7 +40,7 @@ void draw_function(Draw& draw, const Volume& volume, Scene& scene) {
     function.unit_distance = draw.real(0.3, 4);
     function.entries = draw.one_of({0, 0, 2, 17, 64, 256});
     std::vector<double> values;
-    for (int i = draw.between(1, 5); i >= 0; --i)
+    for (std::int64_t i = draw.between(1, 5); i >= 0; --i)
         values.push_back(std::floor(draw.real(0, volume.largest_representable() + 1.0)));
     std::sort(values.begin(), values.end());
     const bool thin = draw.once_in(3);
@@ -88,7 +54,8 @@ void draw_function(Draw& draw, const Volume& volume, Scene& scene) {
 /// A wire's Spec, a few bits from the one it has: the plan refuses some.
 std::string near(Draw& draw, Spec spec) {
     Format& f = spec.format;
-    f.fraction_bits = std::clamp(f.fraction_bits + draw.between(-8, 4), 1, kMostChosenFractionBits);
+    f.fraction_bits =
+        std::clamp(f.fraction_bits + static_cast<int>(draw.between(-8, 4)), 1, kMostChosenFractionBits);
     spec.rounding = draw.one_of({Rounding::trn, Rounding::trn_zero, Rounding::rnd, Rounding::rnd_conv});
     return to_string(spec);
 }
@@ -121,9 +88,9 @@ Case draw_case(unsigned seed) {
     scene.precision.preset = draw.one_of<const char*>({"default", "default", "squeeze", "eight_bit", "wide"});
     Plan plan = make_plan(scene, volume);
     if (draw.once_in(3)) return {scene, std::move(plan)};
-    for (int i = draw.between(1, 10); i > 0; --i) {
+    for (std::int64_t i = draw.between(1, 10); i > 0; --i) {
         const Wire wire = plan.used_wires[static_cast<std::size_t>(
-            draw.between(0, static_cast<int>(plan.used_wires.size()) - 1))];
+            draw.between(0, static_cast<std::int64_t>(plan.used_wires.size()) - 1))];
         scene.precision.override_[static_cast<std::size_t>(wire)] = near(draw, plan.specs[wire]);
     }
     return {scene, make_plan(scene, volume)};
@@ -299,7 +266,8 @@ TEST_P(EveryRule, HalvedIsExceededByAPictureOfItsOwn) {
             if (std::find(plan.used_wires.begin(), plan.used_wires.end(), wire) == plan.used_wires.end())
                 continue;
             Spec coarse = plan.specs[wire];
-            coarse.format.fraction_bits = std::min(draw.between(2, 9), coarse.format.fraction_bits);
+            coarse.format.fraction_bits =
+                std::min(static_cast<int>(draw.between(2, 9)), coarse.format.fraction_bits);
             coarse.rounding = draw.one_of({Rounding::trn, Rounding::rnd_conv});
             scene.precision.override_[static_cast<std::size_t>(wire)] = to_string(coarse);
             plan = make_plan(scene, c.plan.volume);

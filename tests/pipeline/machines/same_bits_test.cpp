@@ -9,6 +9,7 @@
 #include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/record.h"
 #include "pipeline/render.h"
+#include "tests/pipeline/machines/draw.h"
 
 #include <gtest/gtest.h>
 
@@ -17,57 +18,19 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <random>
 #include <sstream>
 #include <string>
 
 namespace squint {
 namespace {
 
-class Draw {
-  public:
-    explicit Draw(unsigned seed) : random_(seed) {}
-    std::int64_t between(std::int64_t low, std::int64_t high) {  // both included
-        return low + static_cast<std::int64_t>(random_() % static_cast<std::uint64_t>(high - low + 1));
-    }
-    bool once_in(int n) { return between(1, n) == 1; }
-    double real(double low, double high) {
-        return low + (high - low) * static_cast<double>(random_() >> 11) * 0x1p-53;
-    }
-    template <class T>
-    T one_of(std::initializer_list<T> values) {
-        return values.begin()[between(0, static_cast<std::int64_t>(values.size()) - 1)];
-    }
-    template <class E>
-    E any_of() {
-        return static_cast<E>(between(0, static_cast<std::int64_t>(std::size(EnumNames<E>::names)) - 1));
-    }
-    Vec3 vector(double low, double high) { return {real(low, high), real(low, high), real(low, high)}; }
-
-  private:
-    std::mt19937_64 random_;
-};
-
-/// White noise: every cell differs from its neighbours as much as a cell can.
-double noise_at(const Vec3& p) {
-    auto bits = static_cast<std::uint64_t>(p.x * 1e6) * 0x9e3779b97f4a7c15u ^
-                static_cast<std::uint64_t>(p.y * 1e6) * 0xc2b2ae3d27d4eb4fu ^
-                static_cast<std::uint64_t>(p.z * 1e6) * 0x165667b19e3779f9u;
-    bits = (bits ^ bits >> 31) * 0xbf58476d1ce4e5b9u;
-    return static_cast<double>((bits ^ bits >> 29) >> 11) * 0x1p-53;
-}
-
 std::shared_ptr<const Volume> draw_volume(Draw& draw, Scene& scene) {
-    static const ProceduralField noise{"noise", "", 8, 16, noise_at, [](const Vec3&) { return Vec3(); }};
-    const auto& fields = procedural_fields();
-    const auto which =
-        static_cast<std::size_t>(draw.between(0, static_cast<std::int64_t>(fields.size()) + 1));
-    const ProceduralField& field = which < fields.size() ? fields[which] : noise;
+    const ProceduralField& field = draw_field(draw, 2);
     Index3 dims{draw.between(8, 33), draw.between(8, 33), draw.between(8, 33)};  // braces: in that order
     if (draw.once_in(16)) dims[static_cast<int>(draw.between(0, 2))] = 1;
     const int bits = draw.one_of({8, 8, 12, 12, 16, 5});
     const Vec3 spacing = draw.once_in(3) ? Vec3(1, 1, 1) : draw.vector(0.3, 2.5);
-    scene.volume.procedural = field.name;  // for the message: `noise` is this file's own
+    scene.volume.procedural = field.name;  // for the message: `noise` is the tests' own
     scene.volume.dims = {dims.x, dims.y, dims.z};
     scene.volume.bits = bits;
     scene.volume.spacing = {spacing.x, spacing.y, spacing.z};
