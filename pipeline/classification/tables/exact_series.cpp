@@ -32,7 +32,7 @@ SlabValue ExactSeries::in_pieces(double front, double back, double length, doubl
         const double next = piece == pieces ? back
                                             : std::clamp(tables.entry.coordinate_at(target),
                                                          std::min(front, back), std::max(front, back));
-        const SlabValue value = one_piece(here, next, rate * std::abs(next - here));
+        SlabValue value = one_piece(here, next, rate * std::abs(next - here));
         here = next;
         return value;
     });

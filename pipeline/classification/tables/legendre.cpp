@@ -90,8 +90,8 @@ SlabValue LegendreSeries::in_pieces(double front, double back, double length, do
         const double target = start + (end - start) * (static_cast<double>(piece) / pieces);
         const double next = piece == pieces ? back : tables.coordinate_at(target);
         // A piece thinner than a rounding of its coordinate is a point of that depth.
-        const SlabValue value = next == here ? SlabValue{color_at(entries, here / per_entry) * share, share}
-                                             : one_piece(here, next, rate * std::abs(next - here));
+        SlabValue value = next == here ? SlabValue{color_at(entries, here / per_entry) * share, share}
+                                       : one_piece(here, next, rate * std::abs(next - here));
         here = next;
         return value;
     });

@@ -228,7 +228,7 @@ TEST(Certificate, OfCarriedRemaindersDoesNotGrowWithTheSlabs) {
 }
 
 TEST(Certificate, RefusesWhatItDoesNotBoundInOneLine) {
-    const auto refusal = [](std::vector<std::string> overrides) -> std::string {
+    const auto refusal = [](const std::vector<std::string>& overrides) -> std::string {
         const Scene scene = scene_with(built_in_scene(), overrides);
         const Plan plan = make_plan(scene, std::make_shared<const Volume>(load_volume(volume_source(scene))));
         try {

@@ -14,10 +14,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <sstream>
 #include <string>
 
@@ -263,11 +263,12 @@ std::string first_difference(const Image& expected, const Image& actual) {
     for (const Channel& channel : expected.channels) {
         const Channel* other = actual.find(channel.name);
         if (!other) return "channel " + channel.name + " is missing";
-        const std::size_t pixels = static_cast<std::size_t>(expected.width * expected.height);
+        const std::size_t pixels =
+            static_cast<std::size_t>(expected.width) * static_cast<std::size_t>(expected.height);
         for (std::size_t i = 0; i < pixels; ++i) {
-            const bool same = channel.is_words()
-                                  ? channel.words[i] == other->words[i]
-                                  : std::memcmp(&channel.values[i], &other->values[i], sizeof(float)) == 0;
+            const bool same = channel.is_words() ? channel.words[i] == other->words[i]
+                                                 : std::bit_cast<std::uint32_t>(channel.values[i]) ==
+                                                       std::bit_cast<std::uint32_t>(other->values[i]);
             if (same) continue;
             std::ostringstream text;
             text << channel.name << " at pixel (" << i % 24 << ", " << i / 24 << "): the model has ";
