@@ -25,6 +25,7 @@
 #include <chrono>
 #include <cstring>
 #include <future>
+#include <utility>
 
 namespace {
 
@@ -369,7 +370,7 @@ PYBIND11_MODULE(_squint, m) {
     m.doc() = "The compiled part of squint.";
     py::register_exception_translator([](std::exception_ptr thrown) {
         try {
-            if (thrown) std::rethrow_exception(thrown);
+            if (thrown) std::rethrow_exception(std::move(thrown));
         } catch (const InputError& error) {
             PyErr_SetString(PyExc_ValueError, error.what());
         }

@@ -140,7 +140,7 @@ class Maker {
         const VolumeSource source = volume_source(scene);
         std::string name;
         for (const auto& [key, value] : resolved(scene))
-            if (key.starts_with("volume.")) name += key + "=" + value + "\n";
+            if (key.starts_with("volume.")) name += fmt::format("{}={}\n", key, value);
         name += source.file;
         if (name != volume_name_ || !volume_) {
             volume_.reset();
@@ -152,7 +152,7 @@ class Maker {
     Plan plan_of(const Scene& scene, int frame = 0) { return make_plan(scene, volume_of(scene), frame); }
     static std::string identity(const Plan& plan) {
         std::string text = plan.real_name();
-        for (const auto& [name, value] : exr_attributes(plan)) text += name + "=" + value + "\n";
+        for (const auto& [name, value] : exr_attributes(plan)) text += fmt::format("{}={}\n", name, value);
         return text;
     }
 
@@ -448,7 +448,8 @@ Result make(const Paper& paper, const Figure& figure, const Settings& settings) 
             row.what = name + ": " + row.what;
             result.rows.push_back(std::move(row));
         }
-        for (const std::string& file : part.files) result.files.push_back("../" + name + "/" + file);
+        for (const std::string& file : part.files)
+            result.files.push_back(fmt::format("../{}/{}", name, file));
         for (const std::string& note : part.notes)
             if (std::find(result.notes.begin(), result.notes.end(), note) == result.notes.end())
                 result.notes.push_back(note);

@@ -41,8 +41,8 @@ std::shared_ptr<const Volume> even_volume(std::int64_t voxels, int bits = 8) {
 }
 std::array<double, 4> middle_pixel(const Plan& plan) {
     const Image image = render(plan).image;
-    const auto at =
-        static_cast<std::size_t>(plan.camera.height / 2 * plan.camera.width + plan.camera.width / 2);
+    const auto width = static_cast<std::size_t>(plan.camera.width);
+    const std::size_t at = static_cast<std::size_t>(plan.camera.height / 2) * width + width / 2;
     std::array<double, 4> pixel{};
     for (std::size_t c = 0; c < 4; ++c) pixel[c] = image.channels[c].values[at];
     return pixel;
@@ -459,7 +459,8 @@ TEST(Judged, WeakGradientsThatFormatsDoNotHoldAreSaid) {
     const auto lit = [](int bits, const char* gradient) {
         const double top = std::ldexp(1.0, bits) - 1;
         const auto volume = volume_of({9, 9, 9}, bits, Vec3(1), [&](const Index3& p) {
-            return p == Index3(8, 8, 8) ? top : double(p.x / 2 + (p.y * p.z) % 2);
+            const auto level = p.x / 2 + (p.y * p.z) % 2;
+            return p == Index3(8, 8, 8) ? top : static_cast<double>(level);
         });
         Scene scene = plain_scene(7, 7);
         scene.transfer_function.points = {{0, 1, 1, 1, 0.9}};

@@ -74,7 +74,10 @@ double largest_difference(const Image& a, const Image& b, bool mirrored = false)
         for (int y = 0; y < a.height; ++y)
             for (int x = 0; x < a.width; ++x) {
                 const auto at = [&](const Image& image, int column) {
-                    return double{image.find(name)->values[static_cast<std::size_t>(y * a.width + column)]};
+                    const std::size_t pixel =
+                        static_cast<std::size_t>(y) * static_cast<std::size_t>(a.width) +
+                        static_cast<std::size_t>(column);
+                    return double{image.find(name)->values[pixel]};
                 };
                 largest = std::max(largest, std::abs(at(a, x) - at(b, mirrored ? a.width - 1 - x : x)));
             }
