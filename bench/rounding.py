@@ -2,7 +2,8 @@
 """What rounding costs: presets against the same pipeline in double, whole pictures and stage by stage.
 
     SQUINT_DATA=... bench/rounding.py [--squint build/release/cli/squint] [--size 800] [--stage-size 160] [--kept FOLDER]
-    bench/rounding.py --methods [--preset default]         # every method on configs/hard, 24x24: largest error in LSB8
+    bench/rounding.py --hard --views 64                    # hard cases from 64 sides, words against double: half an hour
+    bench/rounding.py --hard                               # their slabs against the exact integral (docs/classification.md)
 
 Prints the tables of docs/measurements/rounding.md.  The double path is slow: allow half an hour.  What was measured is kept in
 FOLDER (default out/rounding), so that an interrupted run goes on; empty it to measure anew.
@@ -71,29 +72,30 @@ def stages(arguments, scene, light, preset):
     return found
 
 
-METHODS = [("pc", 1), ("pi1d", 1), ("pi1d_engel", 1), ("pi2d_no_attenuation", 1), ("pi2d", 1)]
-METHODS += [("pips", n) for n in range(1, 6)] + [("leg", n) for n in range(2, 5)]
-
-
-def methods(arguments):
-    """The largest error of any pixel and channel, a preset's words against their own double."""
-    print("| scene | " + " | ".join(m if m not in ("pips", "leg") else f"{m} {n}" for m, n in METHODS) + " |")
-    print("|---|" + "---|" * len(METHODS))
-    for scene in sorted(pathlib.Path("configs/hard").glob("*.toml")):
-        row = f"| {scene.stem} |"
-        for method, order in METHODS:
-            paths = []
-            for preset in (arguments.preset, "real"):
-                paths.append(str(arguments.kept / f"method.{preset}.exr"))
-                done = subprocess.run([arguments.squint, "render", str(scene), "--size", "24x24", "--set",
-                                       f"classification.method={method}", "--set", f"classification.order={order}", "--set",
-                                       f"precision.preset={preset}", "-q", "-o", paths[-1]], capture_output=True)
-            if done.returncode:
-                row += " refused |"
-                continue
-            channels = json.loads(run([arguments.squint, "compare", *paths, "--json"]))["channels"]["all"]
-            row += f" {max(channels[c]['max_error_lsb8'] for c in 'RGBA'):.2f} |"
-        print(row, flush=True)
+def hard_cases(arguments):
+    """Every hard case by every method, as `squint hard` measures it: slabs against the exact integral, or pictures from
+    many sides, words against the same in double; LSB8."""
+    views = ["--views", str(arguments.views), "--sizes", arguments.sizes] if arguments.views else []
+    if arguments.record:
+        record = json.loads(arguments.record.read_text())
+    else:
+        done = subprocess.run([arguments.squint, "hard", *views, "--json"], capture_output=True, text=True)
+        if done.returncode > 1:
+            raise SystemExit(done.stderr)
+        record = json.loads(done.stdout)
+    for number, (scene, methods) in enumerate(record["scenes"].items()):
+        if number == 0:
+            print("| scene | " + " | ".join(methods) + " |\n|---|" + "---|" * len(methods))
+        cells = []
+        for found in methods.values():
+            if "refused" in found:
+                cells.append("refused")
+            elif "rounding_lsb8" in found:
+                cells.append(f"{found['rounding_lsb8']:.2f}")
+            else:
+                beyond = "!" if found["outside_0_C_alpha_1"] else ""
+                cells.append(f"{max(found['color_lsb8'], found['alpha_lsb8']):.2f}{beyond}")
+        print(f"| {scene} | " + " | ".join(cells) + " |")
 
 
 def decibels(value):
@@ -106,12 +108,14 @@ def main():
     parser.add_argument("--size", type=int, default=800)
     parser.add_argument("--stage-size", type=int, default=160)
     parser.add_argument("--kept", type=pathlib.Path, default=pathlib.Path("out/rounding"))
-    parser.add_argument("--methods", action="store_true")
-    parser.add_argument("--preset", default="default")
+    parser.add_argument("--hard", action="store_true")
+    parser.add_argument("--views", type=int, default=0)
+    parser.add_argument("--sizes", default="24,64")
+    parser.add_argument("--record", type=pathlib.Path, help="what squint hard --json printed, instead of running it")
     arguments = parser.parse_args()
     arguments.kept.mkdir(parents=True, exist_ok=True)
-    if arguments.methods:
-        return methods(arguments)
+    if arguments.hard:
+        return hard_cases(arguments)
 
     print(f"## Whole pictures, {arguments.size}x{arguments.size}\n")
     print("| scene | light | aim | " + " | ".join(f"`{p}` dB | max LSB8 | bias LSB8" for p in PRESETS) + " |")
