@@ -1,7 +1,7 @@
 // Shared by several verbs.
 #pragma once
 
-#include "cli/arguments.h"
+#include "cli/common_flags.h"
 #include "pipeline/plan/asked.h"
 
 #include <nlohmann/json_fwd.hpp>

@@ -2,6 +2,7 @@
 #include "core/compare.h"
 
 #include "cli/common.h"
+#include "cli/verb.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "pipeline/record.h"
@@ -12,9 +13,19 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
+#include <utility>
 
 namespace squint::cli {
 namespace {
+
+struct CompareArguments {
+    std::string a, b, diff, json;  // json: a file, or - for standard output
+    double gain = 1;
+    bool srgb = false;
+    std::optional<double> fail_above;  // LSB8
+    std::optional<double> min_psnr;    // dB
+};
 
 using Json = nlohmann::ordered_json;
 
@@ -111,8 +122,6 @@ void show_alike(const CompareArguments& a, Image& x, const Attributes& of_x, Ima
                     first ? a.a : a.b));
 }
 
-}  // namespace
-
 int run(const CompareArguments& a) {
     Attributes of_x, of_y;
     Image x = read_image(a.a, &of_x), y = read_image(a.b, &of_y);
@@ -138,6 +147,47 @@ int run(const CompareArguments& a) {
     if (a.json != "-" && !comparison.all.empty()) print(figures_text(comparison, x));
     for (const std::string& line : failed) say(fmt::format("squint: {}\n", line));
     return failed.empty() ? kDone : kComparisonFailed;
+}
+
+void flags(Flags& f, CompareArguments& a) {
+    const Flag first = f.add("a", a.a, "Picture").required().value("A");
+    const Flag second = f.add("b", a.b, "Picture to compare with").value("B");
+    f.add("--diff", a.diff, "Write A - B: an EXR with its signs, or a PNG of its size").value("OUT");
+    f.add("--gain", a.gain, "Multiply the difference in --diff").value("NUMBER");
+    f.choose("--transfer", {"linear", "srgb"}, a.srgb, "linear, or srgb: encode R, G and B first");
+    f.add("--max-error,--fail-above", a.fail_above, "Fail when any error is larger, in 1/255 of full scale")
+        .not_negative()
+        .value("LSB8");
+    f.add("--min-psnr", a.min_psnr, "Fail when the PSNR over the foreground is lower").value("DB");
+    const Flag json = f.add("--json", a.json,
+                            "Write the figures as JSON; without a file to standard output, in place of "
+                            "the table")
+                          .value_may_be_left_out()
+                          .value("FILE|-");
+    f.then([&a, first, second, json] {
+        if (json.given() && !second.given() && !a.json.empty()) {
+            // A word after a bare --json is a picture.
+            a.b = json.before(first) ? std::exchange(a.a, a.json) : a.json;
+            a.json = "-";
+        }
+        if (a.b.empty())
+            throw InputError("compare: one picture given; allowed: two; see squint compare --help");
+        if (json.given() && a.json.empty()) a.json = "-";
+    });
+}
+
+}  // namespace
+
+namespace verbs {
+extern const Verb compare{
+    .name = "compare",
+    .heading = "Pictures",
+    .help = "Compare two pictures; exit code 1 when a bound fails",
+    .footer =
+        "Different sizes or channels and values that are not finite fail, always.\n\n"
+        "Example:\n  squint compare fixed.exr real.exr --min-psnr 60 --diff diff.exr",
+    .describe = described<CompareArguments, flags, run>,
+};
 }
 
 }  // namespace squint::cli

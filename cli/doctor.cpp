@@ -1,5 +1,6 @@
 // squint doctor: what this installation consists of, and whether it renders the right bits.
 #include "cli/common.h"
+#include "cli/verb.h"
 #include "core/pictures/pictures.h"
 #include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/record.h"
@@ -15,6 +16,10 @@
 
 namespace squint::cli {
 namespace {
+
+struct DoctorArguments {
+    bool json = false;
+};
 
 using Json = nlohmann::ordered_json;
 
@@ -49,8 +54,6 @@ std::string targets() {
     return names;
 }
 
-}  // namespace
-
 int run(const DoctorArguments& a) {
     const int oiio = pictures::codec().version;
     const std::string model = self_test(Path::model), fast = self_test(Path::automatic);
@@ -78,6 +81,22 @@ int run(const DoctorArguments& a) {
         print(table_text(rows));
     }
     return well ? kDone : kComparisonFailed;
+}
+
+void flags(Flags& f, DoctorArguments& a) {
+    add_json_flag(f, a.json);
+}
+
+}  // namespace
+
+namespace verbs {
+extern const Verb doctor{
+    .name = "doctor",
+    .heading = "This program",
+    .help = "Check this installation: libraries, SIMD targets, threads, a test picture",
+    .footer = "Example:\n  squint doctor",
+    .describe = described<DoctorArguments, flags, run>,
+};
 }
 
 }  // namespace squint::cli

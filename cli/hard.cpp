@@ -2,6 +2,7 @@
 // one slab against the exact integral, or of whole pictures against the same in double, or why the method is
 // refused.
 #include "cli/common.h"
+#include "cli/verb.h"
 #include "core/error.h"
 #include "truth/picture_check.h"
 #include "truth/slab_check.h"
@@ -15,6 +16,14 @@
 
 namespace squint::cli {
 namespace {
+
+struct HardArguments {
+    std::vector<std::string> scenes;  // files and folders
+    std::vector<std::string> overrides;
+    int views = 0;  // 0: slabs alone, no pictures
+    std::vector<int> sizes{16, 24};
+    bool json = false;
+};
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
@@ -100,8 +109,6 @@ Json json_of(const HardArguments& a, const Outcome& outcome) {
             {"notes", outcome.notes}};
 }
 
-}  // namespace
-
 int run(const HardArguments& a) {
     const std::vector<NamedMethod> methods = every_method();
     std::vector<std::vector<std::string>> rows{{"scene"}};
@@ -140,6 +147,36 @@ int run(const HardArguments& a) {
         print(head + table_text(rows) + (remarks.empty() ? "" : "\n" + remarks));
     }
     return beyond ? kComparisonFailed : kDone;
+}
+
+void flags(Flags& f, HardArguments& a) {
+    f.add("scenes", a.scenes, "Scene files, and folders of them; default: the cases of configs/hard")
+        .value("SCENE.toml|FOLDER");
+    add_set(f, a.overrides, "Set a key of every scene; may be repeated, the last wins");
+    f.add("--views", a.views,
+          "Whole pictures instead of slabs, from so many sides: words against the same in double")
+        .between(1, 1000)
+        .value("N");
+    f.add("--sizes", a.sizes, "Pixels a side of these pictures")
+        .between(1, 4096)
+        .separated_by_commas()
+        .value("N,...")
+        .shows_default("16,24");
+    add_json_flag(f, a.json);
+}
+
+}  // namespace
+
+namespace verbs {
+extern const Verb hard{
+    .name = "hard",
+    .heading = "What happens inside",
+    .help = "Classify hard transfer functions with every method: errors against the exact integral",
+    .footer =
+        "Examples:\n  squint hard\n  squint hard configs/hard/spike.toml --set precision.preset=wide\n"
+        "  squint hard --views 64",
+    .describe = described<HardArguments, flags, run>,
+};
 }
 
 }  // namespace squint::cli

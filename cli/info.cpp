@@ -1,5 +1,6 @@
-// squint info and squint volume: say what a volume is; write it for other programs.
+// squint info: says what a volume is.
 #include "cli/common.h"
+#include "cli/verb.h"
 #include "core/error.h"
 #include "core/volume_source.h"
 #include "pipeline/record.h"
@@ -9,10 +10,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 
 namespace squint::cli {
 namespace {
+
+struct InfoArguments {
+    std::string volume;  // the name of a procedural volume, or a file
+    std::vector<std::string> overrides;
+    bool json = false;
+};
 
 /// A histogram: at most `most` equal ranges of scalars, from the least to the greatest.
 struct Histogram {
@@ -73,8 +79,6 @@ std::string info_text(const Volume& v) {
     return text;
 }
 
-}  // namespace
-
 int run(const InfoArguments& a) {
     std::vector<std::string> notes;
     const auto volume = load(scene_of_volume(a.volume, a.overrides), notes);
@@ -94,20 +98,28 @@ int run(const InfoArguments& a) {
     return kDone;
 }
 
-int run(const VolumeArguments& a) {
-    if (std::filesystem::path(a.output).extension() != ".nrrd")
-        throw InputError(fmt::format("-o {}: the name must end in .nrrd", a.output));
-    std::vector<std::string> notes;
-    const auto volume = load(scene_of_volume(a.volume, a.overrides), notes);
-    save_nrrd(*volume, a.output);
-    say(fmt::format("{}: {}x{}x{} voxels of {} bits from {}\n", a.output, volume->dims.x, volume->dims.y,
-                    volume->dims.z, 8 * volume->scalar_bytes(), volume->name));
-    return kDone;
+void flags(Flags& f, InfoArguments& a) {
+    f.add("volume", a.volume, "Volume file, folder of slices, or a procedural volume by name")
+        .value("VOLUME");
+    add_series(f, a.overrides);
+    add_set(f, a.overrides, "Set a volume.* key: what a raw file does not say");
+    add_json_flag(f, a.json);
 }
 
-int run(const Text& text) {
-    print(text.text);
-    return kDone;
+}  // namespace
+
+namespace verbs {
+extern const Verb info{
+    .name = "info",
+    .heading = "Volumes",
+    .help = "Describe a volume: size, type, spacing, range, histogram",
+    .footer =
+        "Examples:\n"
+        "  squint info head.nrrd\n"
+        "  squint info head.raw --set volume.dims=[256,256,113] --set volume.type=u16\n"
+        "  squint info phantom",
+    .describe = described<InfoArguments, flags, run>,
+};
 }
 
 }  // namespace squint::cli

@@ -2,15 +2,17 @@
 // exit code.
 //
 //   0 done   1 a comparison failed, or nothing was found that keeps a bound   2 usage or input   70 internal error   130 interrupted
-#include "cli/arguments.h"
+#include "cli/command_line.h"
 #include "cli/common.h"
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "pipeline/render.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <csignal>
 #include <cstdio>
 #include <ctime>
@@ -84,7 +86,7 @@ int main(int argc, char** argv) {
     handle(SIGHUP, on_end);
     handle(SIGPIPE, on_end);
     try {
-        return std::visit([](const auto& arguments) { return run(arguments); }, parse(argc, argv));
+        return parse(argc, argv)();
     } catch (const InputError& error) {
         return report(kUsage, "", error.what());
     } catch (const Cancelled&) {

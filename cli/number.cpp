@@ -1,5 +1,6 @@
 // squint number: a calculator in formats, for people (arguments) and for programs (one operation a line).
 #include "cli/common.h"
+#include "cli/verb.h"
 #include "core/error.h"
 #include "core/text.h"
 #include "fixedpoint/calculator.h"
@@ -14,6 +15,11 @@
 
 namespace squint::cli {
 namespace {
+
+struct NumberArguments {
+    std::vector<std::string> words;  // empty: read operations from standard input
+    bool json = false;
+};
 
 bool any_operand_overflow(const Calculation& c) {
     return std::find(c.operand_overflow.begin(), c.operand_overflow.end(), true) != c.operand_overflow.end();
@@ -70,8 +76,6 @@ std::string as_json(const Calculation& c) {
     return json.dump() + "\n";
 }
 
-}  // namespace
-
 int run(const NumberArguments& a) {
     Calculation c;
     if (!a.words.empty()) {
@@ -98,6 +102,41 @@ int run(const NumberArguments& a) {
         print(a.json ? as_json(c) : for_programs(c));
     }
     return any_wrong ? kUsage : kDone;
+}
+
+void flags(Flags& f, NumberArguments& a) {
+    f.add("words", a.words, "RESULT NUMBER, or RESULT OPERATION OPERAND...; standard input when left out")
+        .value("");
+    add_json_flag(f, a.json);
+}
+
+}  // namespace
+
+namespace verbs {
+extern const Verb number{
+    .name = "number",
+    .heading = "What happens inside",
+    .help = "Calculate in fixed-point formats",
+    .footer =
+        "RESULT is a format with a rounding (trn, trn_zero, rnd, rnd_conv) and an overflow rule (sat, wrap), "
+        "as in\n"
+        "u1.15 trn sat; what is left out is rnd_conv and sat.  Signed formats begin with s.\n"
+        "OPERATION is add or +, sub or -, mul or *, madd (a b c: a b + c), lerp (a b w: a + w (b - a)).\n"
+        "An OPERAND is a format and a number; the format may be left out where it is the one before.  A "
+        "number is\n"
+        "decimal (0.7, -1e-3), a raw integer (#22938) or raw hexadecimal (0x599a).  A decimal is first "
+        "rounded to its\n"
+        "operand's format.  The operation is exact, and its result is quantised once.\n"
+        "\n"
+        "Examples:\n"
+        "  squint number u1.15 0.7\n"
+        "  squint number u1.15 trn mul u1.15 0.7 0.7\n"
+        "  squint number s4.4 rnd wrap add u4.4 15.5 u1.8 0.75\n"
+        "  squint number u12.4 lerp u12.0 100 200 u1.12 0.25\n"
+        "  squint number u1.8 madd '#128' '#255' '#1'\n"
+        "  printf 'u1.15 0.7\\nu0.8 mul 0.5 0.5\\n' | squint number",
+    .describe = described<NumberArguments, flags, run>,
+};
 }
 
 }  // namespace squint::cli

@@ -1,5 +1,6 @@
 // squint pixel: every wire of one ray, sample by sample.
 #include "cli/common.h"
+#include "cli/verb.h"
 #include "core/error.h"
 #include "pipeline/machines/model.h"
 #include "pipeline/record.h"
@@ -11,6 +12,14 @@
 
 namespace squint::cli {
 namespace {
+
+struct PixelArguments {
+    std::vector<std::string> words;  // [SCENE.toml] X Y as given; split below
+    SceneArguments scene;
+    int column = 0, row = 0;
+    std::pair<int, int> samples{0, -1};  // first and last; last -1: all samples
+    bool json = false;
+};
 
 using Json = nlohmann::ordered_json;
 
@@ -88,8 +97,6 @@ Json json_of_trace(const Plan& plan, const PixelArguments& a, const RayTrace& tr
             {"events", events}};
 }
 
-}  // namespace
-
 int run(const PixelArguments& a) {
     const Plan plan = plan_of(a.scene);
     if (a.column < 0 || a.column >= plan.camera.width || a.row < 0 || a.row >= plan.camera.height)
@@ -101,6 +108,47 @@ int run(const PixelArguments& a) {
     print(heading(plan, a, trace) + events_text(plan, a, trace) +
           fmt::format("\nR {:.9g}  G {:.9g}  B {:.9g}  A {:.9g}\n", c[0], c[1], c[2], c[3]));
     return kDone;
+}
+
+void flags(Flags& f, PixelArguments& a) {
+    f.add("scene_x_y", a.words, "Scene file (built-in when left out), column from the left, row from the top")
+        .value("[SCENE.toml] X Y")
+        .required();
+    add_set(f, a.scene.overrides, "Set any key of the scene; may be repeated, the last wins");
+    add_size(f, a.scene.overrides);
+    f.read(
+         "--samples",
+         [&](const std::string& text) {
+             constexpr const char* kAllowed = "FIRST:LAST, as in 10:12";
+             a.samples = pair_of(text, ':', "--samples", kAllowed);
+             if (a.samples.first < 0 || a.samples.second < a.samples.first)
+                 throw InputError(fmt::format("--samples: found \"{}\"; allowed: {}", text, kAllowed));
+         },
+         "Only these samples, counted from 0, both ends included")
+        .value("A:B");
+    add_json_flag(f, a.json);
+    f.then([&a] {
+        const std::vector<std::string>& words = a.words;
+        if (words.size() < 2 || words.size() > 3)
+            throw InputError(fmt::format(
+                "pixel: {} words given; allowed: [SCENE.toml] X Y, as in squint pixel head.toml 256 100",
+                words.size()));
+        if (words.size() == 3) a.scene.file = words[0];
+        a.column = integer_of(words[words.size() - 2], "pixel: X", "a column, 0 at the left");
+        a.row = integer_of(words[words.size() - 1], "pixel: Y", "a row, 0 at the top");
+    });
+}
+
+}  // namespace
+
+namespace verbs {
+extern const Verb pixel{
+    .name = "pixel",
+    .heading = "What happens inside",
+    .help = "Show every wire of one pixel's ray, sample by sample",
+    .footer = "Example:\n  squint pixel head.toml 256 100 --samples 10:12",
+    .describe = described<PixelArguments, flags, run>,
+};
 }
 
 }  // namespace squint::cli

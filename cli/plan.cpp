@@ -1,5 +1,6 @@
 // squint plan: what a scene exercises, what is left out, and why.
 #include "cli/common.h"
+#include "cli/verb.h"
 #include "pipeline/plan_record.h"
 #include "pipeline/record.h"
 
@@ -10,6 +11,11 @@
 
 namespace squint::cli {
 namespace {
+
+struct PlanArguments {
+    SceneArguments scene;
+    bool json = false, brief = false;
+};
 
 using Rows = std::vector<std::vector<std::string>>;
 
@@ -74,8 +80,6 @@ std::string brief_text(const Plan& plan) {
     return text;
 }
 
-}  // namespace
-
 int run(const PlanArguments& a) {
     const Plan plan = plan_of(a.scene);
     if (a.json) return print_json(json_of_plan(plan)), kDone;
@@ -108,6 +112,24 @@ int run(const PlanArguments& a) {
     for (const std::string& warning : plan.warnings) text += "warning: " + warning + "\n";
     print(text);
     return kDone;
+}
+
+void flags(Flags& f, PlanArguments& a) {
+    add_scene(f, a.scene);
+    f.add("--brief", a.brief, "A line a stage: its wires and their formats");
+    add_json_flag(f, a.json);
+}
+
+}  // namespace
+
+namespace verbs {
+extern const Verb plan{
+    .name = "plan",
+    .heading = "What happens inside",
+    .help = "Say what a scene exercises: stages, wires, formats, words, tables, and what is left out and why",
+    .footer = "Example:\n  squint plan head.toml --set precision.preset=squeeze",
+    .describe = described<PlanArguments, flags, run>,
+};
 }
 
 }  // namespace squint::cli

@@ -1,5 +1,6 @@
 // squint render: turns a scene into an EXR, a preview and a record.
 #include "cli/common.h"
+#include "cli/verb.h"
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/preview.h"
@@ -28,6 +29,16 @@
 
 namespace squint::cli {
 namespace {
+
+struct RenderArguments {
+    SceneArguments scene;
+    std::string output, preview, json;  // json: a file, or - for standard output
+    std::string reference_output;       // the reference picture, as EXR
+    RenderOptions options;
+    std::int64_t max_memory = 0;  // bytes; 0: no limit
+    bool reference = false, error = false, bound = false, quiet = false, scene_reference = false,
+         print_scene = false;
+};
 
 using Json = nlohmann::ordered_json;
 
@@ -289,8 +300,6 @@ std::string default_output(const RenderArguments& a) {
     return a.scene.file.empty() ? "squint.exr" : std::filesystem::path(a.scene.file).stem().string() + ".exr";
 }
 
-}  // namespace
-
 int run(const RenderArguments& a) {
     if (a.scene_reference) return print(scene_reference_markdown()), kDone;
     std::string output = a.output.empty() ? default_output(a) : a.output, preview = a.preview;
@@ -340,6 +349,67 @@ int run(const RenderArguments& a) {
         picture.erase("wires"), picture.erase("warnings"), record["pictures"].push_back(picture);
     write_json(a.json, record);
     return kDone;
+}
+
+void flags(Flags& f, RenderArguments& a) {
+    add_scene(f, a.scene);
+    f.add("-o,--output", a.output,
+          "EXR to write, or PNG or JPEG as --preview does; when left out and nothing else is asked "
+          "for, the scene's "
+          "name with .exr; a turntable writes OUT.0000.exr and so on")
+        .value("OUT.exr|png|jpg");
+    f.add("--preview", a.preview, "PNG or JPEG to write: over the background, encoded as sRGB")
+        .value("OUT.png|jpg");
+    f.add("--print-scene", a.print_scene,
+          "Print the scene as TOML, with what was chosen from the data, and stop");
+    f.add("--json", a.json,
+          "Write a record of the picture (schema squint.render/2): time, samples, path, memory, hash")
+        .value("FILE|-");
+    f.add("--error", a.error,
+          "Measure the error against the same scene in double, and each stage's share: up to eight "
+          "more pictures");
+    f.add("--bound", a.bound,
+          "Prove how far any pixel can be from the same scene without rounding, who pays for it, and which "
+          "rays "
+          "are undecided; the EXR gets the channels bound.R, bound.G, bound.B, bound.A (docs/guarantees.md)");
+    f.add("--reference", a.reference, "Measure the error against the exact integral along each ray");
+    f.add("--reference-output", a.reference_output, "Write that integral's picture as EXR").value("OUT.exr");
+    f.add("--audit", a.options.audit,
+          "Count what every wire carried: least, greatest, inexact, underflowed to zero, saturated, wrapped");
+    f.add("--threads", a.options.threads, "Threads; default: one a processor").between(1, 4096).value("N");
+    f.add("--tile", a.options.tile, "Pixels on a side of a thread's piece of work")
+        .between(1, 65536)
+        .value("N")
+        .shows_default();
+    f.choose("--path", {"auto", "model", "lanes"}, a.options.path,
+             "auto, model (one sample at a time) or lanes (SIMD): the same bits");
+    f.add("--target", a.options.target, "SIMD target of the lanes; `squint doctor` lists them").value("NAME");
+    f.choose("--layout", {std::begin(EnumNames<LayoutRule>::names), std::end(EnumNames<LayoutRule>::names)},
+             a.options.layout, "How voxels lie in memory for the lanes: auto, linear or cells");
+    f.clear("--no-skip", a.options.skip, "Visit empty space too");
+    f.read(
+         "--max-memory", [&](const std::string& text) { a.max_memory = size_of(text, "--max-memory"); },
+         "Refuse a scene that needs more, as in 2G; mapped files do not count, layouts take what is left")
+        .value("SIZE");
+    f.add("-q,--quiet", a.quiet, "No progress, no summary");
+    f.add("--scene-reference", a.scene_reference, "Print docs/scene.md, every key of a scene, and stop");
+}
+
+}  // namespace
+
+namespace verbs {
+extern const Verb render{
+    .name = "render",
+    .heading = "Pictures",
+    .help = "Render a scene or a volume to EXR, PNG or JPEG",
+    .footer =
+        "Examples:\n"
+        "  squint render scan.nii.gz -o scan.png\n"
+        "  squint render -o head.exr --preview head.png --error\n"
+        "  squint render head.toml --set precision.preset=squeeze --set sampling.step=0.5 -o squeeze.exr\n"
+        "  squint render head.toml --set 'precision.transparency=u1.8 trn' --audit --json -",
+    .describe = described<RenderArguments, flags, run>,
+};
 }
 
 }  // namespace squint::cli

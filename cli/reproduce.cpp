@@ -3,6 +3,7 @@
 
 #include "cli/common.h"
 #include "cli/shelf.h"
+#include "cli/verb.h"
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/text.h"
@@ -20,6 +21,14 @@
 
 namespace squint::cli {
 namespace {
+
+struct ReproduceArguments {
+    std::string paper, figure;  // empty: all of them; both empty: what there is is listed
+    std::string output = "reproduced", data;
+    std::vector<std::string> overrides;
+    int threads = 0;
+    bool timed = false, json = false, quiet = false;
+};
 
 using namespace squint::reproduce;
 using Json = nlohmann::ordered_json;
@@ -148,8 +157,6 @@ Result made(const Order& order, const ReproduceArguments& a) {
     return result;
 }
 
-}  // namespace
-
 int run(const ReproduceArguments& a) {
     if (!a.data.empty()) setenv("SQUINT_DATA", a.data.c_str(), 1);
     const std::vector<Paper> papers = all_papers();
@@ -172,6 +179,36 @@ int run(const ReproduceArguments& a) {
     }
     if (a.json) print_json(all);
     return some_failed ? kSomeFailed : kDone;
+}
+
+void flags(Flags& f, ReproduceArguments& a) {
+    f.add("paper", a.paper, "squeeze, lee_shin, guetat, or all; what there is when left out").value("PAPER");
+    f.add("figure", a.figure, "One figure or table; all but the timed ones when left out").value("FIGURE");
+    f.add("-o,--output", a.output, "Folder for pictures and tables; what is there already is not made again")
+        .value("FOLDER")
+        .shows_default();
+    f.add("--data", a.data, "Folder of the real volumes; default: SQUINT_DATA of the environment")
+        .value("FOLDER");
+    f.add("--timed", a.timed, "The tables that measure time, too");
+    add_set(f, a.overrides, "Set any key of every scene; may be repeated, the last wins");
+    add_size(f, a.overrides);
+    f.add("--threads", a.threads, "Threads; default: one a processor").between(1, 4096).value("N");
+    add_json_flag(f, a.json);
+    f.add("-q,--quiet", a.quiet, "No progress");
+}
+
+}  // namespace
+
+namespace verbs {
+extern const Verb reproduce{
+    .name = "reproduce",
+    .heading = "Studies",
+    .help = "Make the figures and tables of the papers beside the papers' own numbers",
+    .footer =
+        "Examples:\n  squint reproduce\n  squint reproduce lee_shin figure_5\n"
+        "  squint reproduce guetat --data ~/volumes -o guetat",
+    .describe = described<ReproduceArguments, flags, run>,
+};
 }
 
 }  // namespace squint::cli

@@ -2,18 +2,27 @@
 #include "studies/search/search.h"
 #include "cli/common.h"
 #include "cli/shelf.h"
+#include "cli/verb.h"
 #include "core/error.h"
 #include "studies/search/by_certificate.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <iterator>
 
 namespace squint::cli {
 namespace {
+
+struct SearchArguments {
+    search::Settings settings;
+    std::string guarantee = "views";
+    bool json = false, quiet = false;
+};
 
 using search::Candidate;
 
@@ -63,10 +72,6 @@ std::string summary(const search::Settings& s, const search::Result& r) {
                               std::filesystem::absolute(r.formats_file).string());
 }
 
-}  // namespace
-
-namespace {
-
 std::string summary(const search::Settings& s, const search::CertifiedResult& r) {
     std::string text = fmt::format("bound of at most {:g} LSB8, proven for {} pictures; {} certificates\n",
                                    s.most_error, r.pictures, r.certificates);
@@ -102,8 +107,6 @@ int told(const SearchArguments& a, const search::Settings& settings, const Resul
     return kDone;
 }
 
-}  // namespace
-
 int run(const SearchArguments& a) {
     search::Settings settings = a.settings;
     for (std::string& scene : settings.scenes) scene = file_of(scene);
@@ -127,6 +130,90 @@ int run(const SearchArguments& a) {
     const search::Result result = run_search(settings);
     line.clear();
     return told(a, settings, result);
+}
+
+void flags(Flags& f, SearchArguments& a) {
+    search::Settings& s = a.settings;
+    s.folder = "found", s.command = f.command();
+    f.add("scenes", s.scenes, "Scene files, one set of formats for all; the built-in scene when left out")
+        .value("SCENE.toml");
+    f.add("--max-error", s.most_error,
+          "The bound, in 1/255 of full scale, against the same pipeline in double")
+        .required()
+        .positive()
+        .value("LSB8");
+    f.choose("--cost", {std::begin(search::kCostNames), std::end(search::kCostNames)}, s.cost,
+             "What to make small: bits (words and multipliers, docs/sweeps.md), time (of a picture, on this "
+             "machine) or table-bytes; default: bits");
+    f.choose(
+        "--figure", {std::begin(search::kFigureNames), std::end(search::kFigureNames)}, s.figure,
+        "What is bounded: max, the greatest error of any pixel, or rms over the foreground; default: max");
+    f.choose("--transfer", {"linear", "srgb"}, s.srgb,
+             "linear, or srgb: bound the colours as a display shows them; default: linear");
+    f.read_list(
+         "--wires",
+         [&](const std::vector<std::string>& names) {
+             for (const std::string& name : names) {
+                 Wire wire{};
+                 if (!sweep::find_wire(name, wire))
+                     throw InputError(fmt::format(
+                         "--wires: found \"{}\"; allowed: wires as docs/scene.md, [precision], lists them",
+                         name));
+                 if (std::find(s.wires.begin(), s.wires.end(), wire) == s.wires.end())
+                     s.wires.push_back(wire);
+             }
+         },
+         "Search only these; default: every wire that the scenes use")
+        .separated_by_commas()
+        .value("NAME,...");
+    f.clear("--keep-integer-bits", s.integer_bits,
+            "Search fraction bits only: ranges stay as the scene's preset has them");
+    f.add("--views", s.views, "Views of a full turn to tune on; as many others, 16 at least, are held out")
+        .between(1, 1000)
+        .value("N")
+        .shows_default();
+    f.add("--guarantee", a.guarantee,
+          "What the formats are held to: views, formats that a held-out view breaks are never written; or "
+          "pictures, no pixel of the --views pictures can err by more, proven (docs/guarantees.md); "
+          "default: views")
+        .one_of({"views", "pictures"})
+        .value("NAME");
+    f.add("--restarts", s.descent.restarts, "Times that the search starts again from a random place below")
+        .between(0, 10000)
+        .value("N")
+        .shows_default();
+    f.add("--seed", s.descent.seed, "Of the restarts").value("N").shows_default();
+    f.add("-o,--output", s.folder,
+          "Folder for formats.toml, search.json and the trail: a run that squint report takes; "
+          "pictures that are there are not rendered again")
+        .value("RUN")
+        .shows_default();
+    add_set(f, s.overrides, "Set any key of every scene; may be repeated, the last wins");
+    add_size(f, s.overrides);
+    f.add("--threads", s.threads,
+          "Pictures at a time; threads of a picture that is timed; default: one a processor")
+        .between(1, 4096)
+        .value("N");
+    add_json_flag(f, a.json);
+    f.add("-q,--quiet", a.quiet, "No progress, no summary");
+}
+
+}  // namespace
+
+namespace verbs {
+extern const Verb search{
+    .name = "search",
+    .heading = "Choosing formats",
+    .help = "Find the cheapest formats that keep a scene's rounding error under a bound",
+    .footer =
+        "The same scenes, settings and seed give the same formats, but where time is the cost.  Where no "
+        "formats "
+        "keep the bound it ends with 1 and writes none.\n\n"
+        "Example:\n"
+        "  squint search head.toml --size 128x128 --max-error 1 -o found\n"
+        "  squint render head.toml --set precision.preset=$PWD/found/formats.toml && squint report found",
+    .describe = described<SearchArguments, flags, run>,
+};
 }
 
 }  // namespace squint::cli

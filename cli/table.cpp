@@ -1,6 +1,7 @@
 // squint table: the tables of a scene's method as words, to look at and plot.  Two dimensions (pi2d) become
 // EXR: channels R G B A, row = front, column = back; one dimension becomes CSV, a row an entry.
 #include "cli/common.h"
+#include "cli/verb.h"
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/image.h"
@@ -11,6 +12,11 @@
 
 namespace squint::cli {
 namespace {
+
+struct TableArguments {
+    SceneArguments scene;
+    std::string output;
+};
 
 bool ends_in(const std::string& path, const char* extension) {
     return std::filesystem::path(path).extension() == extension;
@@ -70,8 +76,6 @@ std::string csv_of(const Plan& plan) {
     return text;
 }
 
-}  // namespace
-
 int run(const TableArguments& a) {
     const Plan plan = plan_of(a.scene);
     if (const auto* method = std::get_if<PreIntegrated2D>(&plan.method)) {
@@ -86,6 +90,26 @@ int run(const TableArguments& a) {
         write_text_whole(a.output, csv_of(plan));
     }
     return kDone;
+}
+
+void flags(Flags& f, TableArguments& a) {
+    add_scene(f, a.scene);
+    f.add("-o,--output", a.output,
+          "pi2d: EXR, row = front, column = back; the others: CSV, a row an entry, raw words")
+        .required()
+        .value("OUT.exr|OUT.csv");
+}
+
+}  // namespace
+
+namespace verbs {
+extern const Verb table{
+    .name = "table",
+    .heading = "What happens inside",
+    .help = "Write the tables of a scene's classification method",
+    .footer = "Example:\n  squint table head.toml --set classification.method=pi2d -o table.exr",
+    .describe = described<TableArguments, flags, run>,
+};
 }
 
 }  // namespace squint::cli
