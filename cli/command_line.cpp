@@ -171,6 +171,11 @@ std::vector<std::string> flags_of(const CLI::App& verb) {
     return names;
 }
 
+/// A message and where help is: a clause of its own after a question.
+std::string with_help(const std::string& message, const std::string& where) {
+    return message + (message.ends_with('?') ? " See " : "; see ") + where;
+}
+
 /// CLI11's message on one line, with where help is.  Names a misspelt word before a missing one.
 std::string message_of(const CLI::App& verb, const CLI::ParseError& error) {
     std::string message = error.what();
@@ -185,7 +190,8 @@ std::string message_of(const CLI::App& verb, const CLI::ParseError& error) {
         }
     std::replace(message.begin(), message.end(), '\n', ' ');
     while (!message.empty() && (message.back() == ' ' || message.back() == '.')) message.pop_back();
-    return fmt::format("{}: {}; see squint {} --help", verb.get_name(), message, verb.get_name());
+    return with_help(fmt::format("{}: {}", verb.get_name(), message),
+                     fmt::format("squint {} --help", verb.get_name()));
 }
 
 FlagText text_of(const CLI::Option& option) {
@@ -270,13 +276,13 @@ std::function<int()> parse(int argc, char** argv) {
         if (!chosen().empty()) throw InputError(message_of(*app.get_subcommands()[0], error));
         const std::vector<std::string> words = app.remaining();
         const bool flag = !words.empty() && words[0].starts_with('-');
-        throw InputError((words.empty() ? error.what()
-                                        : unknown(flag ? "flag" : "verb", words[0],
-                                                  flag ? flags_of(app) : program.names())) +
-                         std::string("; squint help lists them"));
+        throw InputError(with_help(
+            words.empty() ? error.what()
+                          : unknown(flag ? "flag" : "verb", words[0], flag ? flags_of(app) : program.names()),
+            "squint help"));
     }
     const int verb = program.find(chosen());
-    if (verb < 0) throw InputError("no verb given; squint help lists them");
+    if (verb < 0) throw InputError("no verb given; see squint help");
     return program.run[static_cast<std::size_t>(verb)];
 }
 

@@ -61,7 +61,8 @@ class Reader {
     }
     [[noreturn]] void refuse(const TomlValue& value, std::string_view key, std::string_view found,
                              std::string_view allowed) const {
-        throw InputError(fmt::format("{}: found {}; allowed: {}{}", place_of(value, key), found, allowed,
+        throw InputError(fmt::format("{}: found {}{}: {}{}", place_of(value, key), found,
+                                     found.ends_with('?') ? " Allowed" : "; allowed", allowed,
                                      optional_ ? ", or \"auto\"" : ""));
     }
     bool is_section(const std::string& key) const {

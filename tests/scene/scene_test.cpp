@@ -130,13 +130,13 @@ TEST(SceneFile, SaysWhichTypeWasFoundAndWhichIsAllowed) {
 
 TEST(SceneFile, ListsTheNamesOfAnEnumeration) {
     EXPECT_EQ(refusal("[classification]\nmethod = 'pisp'\n"),
-              "s.toml:5:10: classification.method: found \"pisp\"; did you mean \"pips\"?; allowed: pc, "
+              "s.toml:5:10: classification.method: found \"pisp\"; did you mean \"pips\"? Allowed: pc, "
               "pc_mid, pi2d, "
               "pi2d_no_attenuation, pi1d, pi1d_engel, pips or leg");
     EXPECT_THAT(refusal("[volume]\nprocedural = 'fantom'\n"),
-                HasSubstr("did you mean \"phantom\"?; allowed: "));
+                HasSubstr("did you mean \"phantom\"? Allowed: "));
     EXPECT_THAT(refusal_of_file("[transfer_function]\npreset = 'ct_bnoe'\n"),
-                HasSubstr("did you mean \"ct_bone\"?; allowed: "));
+                HasSubstr("did you mean \"ct_bone\"? Allowed: "));
     EXPECT_EQ(refusal("[precision]\npreset = 'fast'\n"),
               "s.toml:5:10: precision.preset: found \"fast\"; allowed: default, squeeze, eight_bit, "
               "volumepro, vizard2, ultravis, wide, "
