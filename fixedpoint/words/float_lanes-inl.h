@@ -98,6 +98,10 @@ HWY_INLINE Lanes<float, K> quantise(Lanes<float, K> x, const Rescale& to) {
     return shift_left(x, -to.shift);
 }
 template <KnownRescales K>
+HWY_INLINE Lanes<float, K> quantise_raw(Lanes<float, K> raw, const Rescale&) {
+    return raw;
+}
+template <KnownRescales K>
 HWY_INLINE Lanes<float, K> quotient(Lanes<float, K> numerator, Lanes<float, K> denominator,
                                     const Rescale& to) {
     return shift_left(numerator, -to.shift) / denominator;

@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 
 namespace squint {
 
@@ -24,12 +26,11 @@ struct Real {
     friend constexpr bool operator==(Real a, Real b) { return a.v == b.v; }
     friend constexpr bool operator<(Real a, Real b) { return a.v < b.v; }
 };
-/// 2^bits, |bits| < 1000.
+/// 2^bits, |bits| < 1000, by its exponent: a division would cost as much as all else that a wire does.
 template <class T>
 constexpr T power_of_two(int bits) {
-    return bits >= 0 ? (bits < 63 ? static_cast<T>(std::uint64_t{1} << bits)
-                                  : power_of_two<T>(bits - 62) * power_of_two<T>(62))
-                     : 1 / power_of_two<T>(-bits);
+    constexpr int kBias = 1023, kMantissaBits = 52;  // of a double
+    return static_cast<T>(std::bit_cast<double>(static_cast<std::uint64_t>(kBias + bits) << kMantissaBits));
 }
 template <class T>
 constexpr Real<T> make_word(WordTag<Real<T>>, std::int64_t value) {
@@ -107,17 +108,16 @@ Real<T> shift_by(Real<T> x, Real<T> bits) {
 /// For traces: records a wire's value without rounding it.
 template <class T>
 Real<T> traced(Real<T> value, const Rescale& to) {
-    if (to.statistics && to.statistics->trace) {
+    if (to.statistics->trace) {
         const double nearest = std::floor(static_cast<double>(value.v) + 0.5);
         to.statistics->trace->push_back(
             {to.wire, static_cast<double>(value.v), static_cast<std::int64_t>(nearest)});
     }
     return value;
 }
+// Where a wire's Rescale is active.
 template <class T>
-Real<T> quantise(Real<T> x, const Rescale& to) {
-    const T scaled = x.v * power_of_two<T>(-to.shift);
-    if (!to.active) return traced(Real<T>{scaled}, to);
+Real<T> rounded_raw(T scaled, const Rescale& to) {
     // Exact for |scaled| < 2^52: the fraction of a double is a double.
     const T below = std::floor(scaled), rest = scaled - below;
     T rounded = below;
@@ -130,11 +130,19 @@ Real<T> quantise(Real<T> x, const Rescale& to) {
         return {std::min(std::max(rounded, static_cast<T>(to.lowest)), static_cast<T>(to.highest))};
     return {static_cast<T>(limit(static_cast<Int128>(rounded), to))};
 }
+/// quantise of what has the wire's fraction bits already: to.shift is not asked.
+template <class T>
+Real<T> quantise_raw(Real<T> raw, const Rescale& to) {
+    if (to.active) return rounded_raw(raw.v, to);
+    return to.statistics ? traced(raw, to) : raw;
+}
+template <class T>
+Real<T> quantise(Real<T> x, const Rescale& to) {
+    return quantise_raw(Real<T>{x.v * power_of_two<T>(-to.shift)}, to);
+}
 template <class T>
 Real<T> quotient(Real<T> numerator, Real<T> denominator, const Rescale& to) {
-    Rescale raw = to;
-    raw.shift = 0;
-    return quantise(Real<T>{numerator.v * power_of_two<T>(-to.shift) / denominator.v}, raw);
+    return quantise_raw(Real<T>{numerator.v * power_of_two<T>(-to.shift) / denominator.v}, to);
 }
 
 static_assert(Word<Real<double>> && Word<Real<float>> && RealWord<Real<double>>);

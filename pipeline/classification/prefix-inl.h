@@ -165,12 +165,12 @@ inline Slab<Real<double>> exact_slab_of(const EntryLookup& e, const preintegrati
     const double input = power_of_two<double>(-e.input_fraction);
     const preintegration::SlabValue value = series.slab(
         front.v * input, back.v * input, length.v * power_of_two<double>(-e.length_fraction) * series.step);
-    Rescale to_color = e.to_color, to_alpha = e.to_alpha;
-    to_color.shift = to_alpha.shift = 0;
     const double color = value.alpha > 0 ? power_of_two<double>(e.color_fraction) / value.alpha : 0;
-    const auto channel = [&](int c) { return quantise(Real<double>{value.color[c] * color}, to_color); };
+    const auto channel = [&](int c) {
+        return quantise_raw(Real<double>{value.color[c] * color}, e.to_color);
+    };
     return {{channel(0), channel(1), channel(2)},
-            quantise(Real<double>{value.alpha * power_of_two<double>(e.alpha_fraction)}, to_alpha)};
+            quantise_raw(Real<double>{value.alpha * power_of_two<double>(e.alpha_fraction)}, e.to_alpha)};
 }
 
 /// The straight colour of the wall that ends a slab.

@@ -150,10 +150,8 @@ HWY_INLINE W confidence(const GradientStage& s, const std::array<W, 3>& gradient
 template <RealWord W>
 HWY_INLINE W confidence(const GradientStage& s, const std::array<W, 3>& g) {
     const W length = square_root(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
-    Rescale raw = s.to_confidence;
-    raw.shift = 0;
     const W part = min(length / W::from(s.floor_exact), constant<W>(1));
-    return quantise(shift_left(part, s.confidence_fraction), raw);
+    return quantise_raw(shift_left(part, s.confidence_fraction), s.to_confidence);
 }
 
 /// Without rounding: the definition itself, but zero for what is no longer than a rounding.
@@ -161,11 +159,9 @@ template <RealWord W>
 HWY_INLINE std::array<W, 3> normalise(const GradientStage& s, const std::array<W, 3>& g) {
     const W zero = constant<W>(0), shortest = W::from(s.vanishing);
     const W length = square_root(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
-    Rescale raw = s.to_normal;
-    raw.shift = 0;
     const W scale = W::from(-power_of_two<double>(s.normal_fraction)) / length;
     const auto component = [&](std::size_t a) SQUINT_WRITTEN_OUT {
-        return select(shortest < length, quantise(g[a] * scale, raw), zero);
+        return select(shortest < length, quantise_raw(g[a] * scale, s.to_normal), zero);
     };
     return {component(0), component(1), component(2)};
 }

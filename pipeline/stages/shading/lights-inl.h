@@ -59,9 +59,8 @@ HWY_INLINE W power(const ShadingStage& s, W x) {
 inline Real<double> power(const ShadingStage& s, Real<double> x) {
     if (s.power != PowerRule::table || s.power_table.active) return power<Real<double>>(s, x);
     const double one = power_of_two<double>(s.power_fraction);
-    Rescale to = s.to_power_lerp;
-    to.shift = 0;
-    return quantise(Real<double>{portable::pow(quantise(x, s.to_power_input).v / one, s.exponent) * one}, to);
+    const double base = quantise(x, s.to_power_input).v / one;
+    return quantise_raw(Real<double>{portable::pow(base, s.exponent) * one}, s.to_power_lerp);
 }
 
 /// The direction to a light.
