@@ -1,6 +1,7 @@
 #include "pipeline/render.h"
 
 #include "core/error.h"
+#include "pipeline/machines/lanes/blocks_met.h"
 #include "pipeline/machines/lanes/lane_renderer.h"
 #include "pipeline/machines/model.h"
 
@@ -61,7 +62,8 @@ Rendering render(const Plan& plan, const RenderOptions& options) {
     if (obstacle && options.path == Path::lanes) throw InputError(fmt::format("--path lanes: {}", *obstacle));
     std::optional<lanes::LaneRenderer> fast;
     if (!obstacle && options.path != Path::model) fast.emplace(plan, options);
-    const ModelRenderer model(plan, options.audit);
+    ModelRenderer model(plan, options.audit);
+    if (!fast && options.skip) model.skip_empty_space(lanes::room_of(options));
     statistics.path = fast ? "lanes" : "model";
     statistics.target = fast ? fast->target() : "";
     statistics.why =

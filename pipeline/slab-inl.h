@@ -28,7 +28,9 @@
 
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <array>
+#include <cstdint>
 
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
@@ -40,23 +42,28 @@ struct FromVolume {
 
     template <class W>
     Cell<W> cell(const std::array<W, 3>& at) const {
-        const Index3 p(to_index(at[0]), to_index(at[1]), to_index(at[2]));
-        Cell<W> corners;
-        for (int i = 0; i < 8; ++i)
-            corners.corner[static_cast<std::size_t>(i)] = constant<W>(
-                volume.at(voxel_at(p.x + (i & 1), volume.dims.x), voxel_at(p.y + (i >> 1 & 1), volume.dims.y),
-                          voxel_at(p.z + (i >> 2), volume.dims.z)));
-        return corners;
+        return {cube<W, 2>(at, 0)};
     }
     template <class W>
     Neighbourhood<W> neighbourhood(const std::array<W, 3>& at) const {
-        const Index3 p(to_index(at[0]), to_index(at[1]), to_index(at[2]));
-        Neighbourhood<W> n;
-        for (int i = 0; i < 64; ++i)
-            n.voxel[static_cast<std::size_t>(i)] = constant<W>(volume.at(
-                voxel_at(p.x + (i & 3) - 1, volume.dims.x), voxel_at(p.y + (i >> 2 & 3) - 1, volume.dims.y),
-                voxel_at(p.z + (i >> 4) - 1, volume.dims.z)));
-        return n;
+        return {cube<W, 4>(at, 1)};
+    }
+
+  private:
+    // N^3 voxels, from `before` voxels below a cell on, x fastest.
+    template <class W, std::int64_t N>
+    std::array<W, N * N * N> cube(const std::array<W, 3>& at, std::int64_t before) const {
+        std::array<std::array<std::int64_t, N>, 3> place;
+        for (std::size_t a = 0; a < 3; ++a)
+            for (std::int64_t i = 0; i < N; ++i)
+                place[a][static_cast<std::size_t>(i)] =
+                    voxel_at(to_index(at[a]) + i - before, volume.dims[static_cast<int>(a)]);
+        std::array<W, N * N * N> voxels;
+        std::size_t i = 0;
+        for (const std::int64_t z : place[2])
+            for (const std::int64_t y : place[1])
+                for (const std::int64_t x : place[0]) voxels[i++] = constant<W>(volume.at(x, y, z));
+        return voxels;
     }
 };
 
@@ -111,6 +118,9 @@ class Slabs {
         const W full = constant<W>(std::int64_t{1} << plan_.location.length_fraction);
         composite_slab(front_, back(), select(k == last_, ray_.last_length, full));
     }
+
+    /// Leaves out slabs that are transparent.
+    void pass() { carries_ = false; }
 
     /// Whether slabs behind this one can still be seen.
     auto goes_on() const { return HWY_NAMESPACE::goes_on(plan_.compositing, pixel); }
@@ -320,11 +330,20 @@ class Slabs {
     Sample<W> front_, back_;
 };
 
-/// Casts a ray of `count` slabs through the volume; it ends where nothing behind can be seen.
-template <class W, class M, class Voxels, class Observer>
-void cast_ray(const Plan& plan, const M& method, const Voxels& voxels, const RayWords<W>& ray,
-              std::int64_t count, Observer& observer, Pixel<W>& pixel) {
+/// Knows of no transparent slabs.
+struct NothingClear {
+    constexpr std::int64_t operator()(std::int64_t) const { return 0; }
+};
+
+/// Casts a ray of `count` slabs through the volume; it ends where nothing behind can be seen.  Returns how many
+/// went through the stages.  clear_from(k): how many slabs from k on, in either direction, are known to be
+/// transparent: they count as composited.
+template <class W, class M, class Voxels, class Observer, class ClearFrom = NothingClear>
+std::int64_t cast_ray(const Plan& plan, const M& method, const Voxels& voxels, const RayWords<W>& ray,
+                      std::int64_t count, Observer& observer, Pixel<W>& pixel,
+                      const ClearFrom& clear_from = {}) {
     Slabs<W, M, Voxels, Observer> slabs(plan, method, voxels, ray, constant<W>(count), observer);
+    std::int64_t visited = 0;
     pixel.samples = 0;
     if (plan.projection_mode) {
         if (count > 0) {
@@ -342,16 +361,23 @@ void cast_ray(const Plan& plan, const M& method, const Voxels& voxels, const Ray
             }
             slabs.project(all);
         }
-        pixel.samples = count;
+        visited = pixel.samples = count;
     } else {
         const bool backwards = plan.compositing.form == CompositingForm::back_to_front;
-        for (std::int64_t i = 0; i < count; ++i) {
-            slabs.step(constant<W>(backwards ? count - 1 - i : i));
-            ++pixel.samples;
+        while (pixel.samples < count) {
+            const std::int64_t k = backwards ? count - 1 - pixel.samples : pixel.samples;
+            if (const std::int64_t clear = clear_from(k); clear > 0) {
+                pixel.samples = std::min(pixel.samples + clear, count);
+                slabs.pass();
+                continue;
+            }
+            slabs.step(constant<W>(k));
+            ++pixel.samples, ++visited;
             if (!backwards && !slabs.goes_on()) break;
         }
     }
     pixel.gathered = slabs.pixel;
+    return visited;
 }
 
 }  // namespace squint::HWY_NAMESPACE

@@ -1,5 +1,6 @@
 #include "pipeline/machines/model.h"
 
+#include "pipeline/machines/lanes/blocks_met.h"
 #include "pipeline/machines/model/rays.h"
 #include "pipeline/machines/model/store.h"
 #include "pipeline/slab-inl.h"
@@ -40,21 +41,28 @@ Pixel<std::int64_t> project_pixel(const Plan& plan, const ProjectedRay<std::int6
         plan.method);
 }
 
+void ModelRenderer::skip_empty_space(std::int64_t room) {
+    const CompositingStage& s = plan_.compositing;
+    const bool divides = s.form == CompositingForm::straight || s.is_unit255();
+    if (plan_.real && !plan_.float32 && !plan_.projection_mode && !divides)
+        empty_ = lanes::empty_space_of(plan_, room);
+}
+
 void ModelRenderer::render_tile(int left, int top, int right, int bottom, Image& image,
                                 TileStatistics& statistics) const {
     if (audit_ && !plan_.real) {
         Plan audited = plan_;  // with its own counters: no thread waits for another
         statistics.wires = std::make_unique<std::array<WireStatistics, kWires>>();
         attach_statistics(audited, *statistics.wires);
-        model::cast_tile<Audited>(audited, left, top, right, bottom, image, statistics);
+        model::cast_tile<Audited>(audited, empty_.get(), left, top, right, bottom, image, statistics);
     } else if (plan_.float32) {
-        model::cast_tile<Real<float>>(plan_, left, top, right, bottom, image, statistics);
+        model::cast_tile<Real<float>>(plan_, empty_.get(), left, top, right, bottom, image, statistics);
     } else if (plan_.real) {
-        model::cast_tile<Real<double>>(plan_, left, top, right, bottom, image, statistics);
+        model::cast_tile<Real<double>>(plan_, empty_.get(), left, top, right, bottom, image, statistics);
     } else if (plan_.word_bits == 64) {
-        model::cast_tile<std::int64_t>(plan_, left, top, right, bottom, image, statistics);
+        model::cast_tile<std::int64_t>(plan_, empty_.get(), left, top, right, bottom, image, statistics);
     } else {
-        model::cast_tile<Int128>(plan_, left, top, right, bottom, image, statistics);
+        model::cast_tile<Int128>(plan_, empty_.get(), left, top, right, bottom, image, statistics);
     }
 }
 

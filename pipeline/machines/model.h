@@ -16,6 +16,9 @@ struct TileStatistics {
     std::unique_ptr<std::array<WireStatistics, kWires>> wires;  // with audit
 };
 
+namespace lanes {
+struct EmptySpace;
+}
 template <class W>
 struct Pixel;
 template <class W>
@@ -32,6 +35,10 @@ class ModelRenderer {
   public:
     explicit ModelRenderer(const Plan& plan, bool audit = false) : plan_(plan), audit_(audit) {}
 
+    /// Leaves empty space out where words are doubles, and a transparent slab is the identity to their last bit:
+    /// `room` bytes may be taken to find it.
+    void skip_empty_space(std::int64_t room);
+
     /// Renders pixels [left, right) x [top, bottom) into every channel of `image`.  Many threads may call it
     /// at once for disjoint tiles.
     void render_tile(int left, int top, int right, int bottom, Image& image,
@@ -43,6 +50,7 @@ class ModelRenderer {
   private:
     const Plan& plan_;
     bool audit_;
+    std::shared_ptr<const lanes::EmptySpace> empty_;
 };
 
 /// Every value on every wire along one ray, in the order of computation.  `slab` is -1 before the first slab.

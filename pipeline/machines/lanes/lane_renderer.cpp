@@ -1,19 +1,17 @@
 #include "pipeline/machines/lanes/lane_renderer.h"
 
+#include "pipeline/machines/lanes/blocks_met.h"
 #include "pipeline/machines/lanes/kept.h"
-#include "pipeline/machines/lanes/kept_empty_space.h"
 #include "pipeline/machines/lanes/packet_loop.h"
 #include "pipeline/machines/lanes/targets.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <limits>
 #include <vector>
 
@@ -47,37 +45,6 @@ KnownRescales known_of(Stage... stage) {
     const auto visit = [&](auto& r) { all(r); };
     (stage.visit(visit), ...);
     return all.known;
-}
-
-// How far samples may leave the rendered box, in voxels.
-double drift_of(const Plan& plan) {
-    const Index3& n = plan.volume->dims;
-    const double of_floats = plan.float32 ? static_cast<double>(std::max({n.x, n.y, n.z})) * 0x1p-20 : 0;
-    return of_floats + plan.location.drift();
-}
-
-// How many blocks apart a slab's ends may be; 0 where one sample classifies it.
-int slab_reach(const Plan& plan) {
-    if (!plan.samples_both_ends()) return 0;
-    return static_cast<int>(std::ceil(std::min((plan.scene.sampling.step + drift_of(plan)) / kBlock, 1e6)));
-}
-
-// The blocks that samples may lie in, with a margin of a slab's reach and one more.
-BlockBox blocks_met(const Plan& plan) {
-    const Volume& volume = *plan.volume;
-    const BlockBox all = all_blocks_of(volume);
-    const Vec3 low = volume.voxel_from_grid(plan.box_low), high = volume.voxel_from_grid(plan.box_high);
-    const double beyond = kBlock * (slab_reach(plan) + 1) + drift_of(plan) + 1;
-    BlockBox box;
-    for (int a = 0; a < 3; ++a) {
-        const auto block = [&](double voxel) {
-            const double inside = std::clamp(voxel, 0.0, static_cast<double>(volume.dims[a] - 1));
-            return std::min(static_cast<std::int64_t>(inside) >> kBlockBits, all.blocks[a] - 1);
-        };
-        box.low[a] = block(low[a] - beyond);
-        box.blocks[a] = std::max(block(high[a] + beyond), box.low[a]) - box.low[a] + 1;
-    }
-    return box;
 }
 
 // Whether rays may meet a block of cells.  Rays that skip empty space still run through what lies within a
@@ -155,14 +122,6 @@ void build_cells(const std::shared_ptr<CellBlocks>& cells, const Volume& volume,
             return built.cells.lock() == cells && built.empty == empty && built.box.low == box.low &&
                    built.box.blocks == box.blocks;
         });
-}
-
-// The memory that the system could give: pages of mapped files make way.
-std::int64_t free_memory() {
-    std::ifstream file("/proc/meminfo");
-    for (std::string word; file >> word;)
-        if (std::int64_t kib = 0; word == "MemAvailable:" && file >> kib) return kib << 10;
-    return std::int64_t{sysconf(_SC_AVPHYS_PAGES)} * sysconf(_SC_PAGESIZE);
 }
 
 }  // namespace
@@ -250,8 +209,8 @@ LaneRenderer::LaneRenderer(const Plan& plan, const RenderOptions& options)
       target_(find_target(options.target)),
       ways_(ways_of(plan)),
       count_slabs_(slab_counter(target_)) {
-    room_ = options.layout_bytes >= 0 ? options.layout_bytes : free_memory() / 2;
-    if (options.skip && plan.skips_empty_space) find_empty();
+    room_ = room_of(options);
+    if (options.skip) find_empty();
     choose_layout(options);
     kernels_ = kernels_for(plan, ways_, voxels_, target_);
     schedule_ = schedule_of(plan, kernels_);
@@ -259,16 +218,12 @@ LaneRenderer::LaneRenderer(const Plan& plan, const RenderOptions& options)
 }
 
 void LaneRenderer::find_empty() {
-    constexpr int kMostReach = 4;  // longer slabs skip little
-    if (slab_reach(plan_) > kMostReach) return;
-    const BlockBox box = blocks_met(plan_);
-    if (EmptySpace::bytes_for(box) > room_) {
-        no_room_to_skip_ = true;
-        return;
-    }
-    empty_ = kept_empty_space(*plan_.volume, box, plan_.entries, slab_reach(plan_), plan_.entry_reach,
-                              plan_.projection_mode);
-    room_ -= EmptySpace::bytes_for(empty_->box);
+    const std::int64_t needs = EmptySpace::bytes_for(blocks_met(plan_));
+    empty_ = empty_space_of(plan_, room_);
+    if (empty_)
+        room_ -= EmptySpace::bytes_for(empty_->box);
+    else
+        no_room_to_skip_ = may_skip(plan_) && needs > room_;
 }
 
 void LaneRenderer::choose_layout(const RenderOptions& options) {

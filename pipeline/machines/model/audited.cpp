@@ -2,7 +2,8 @@
 
 namespace squint::model {
 
-template void cast_tile<Audited>(const Plan&, int, int, int, int, Image&, TileStatistics&);
+template void cast_tile<Audited>(const Plan&, const lanes::EmptySpace*, int, int, int, int, Image&,
+                                 TileStatistics&);
 template void cast_traced<Audited>(const Plan&, std::vector<TraceEvent>&, RayTrace&);
 
 }  // namespace squint::model

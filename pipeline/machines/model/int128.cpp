@@ -2,6 +2,7 @@
 
 namespace squint::model {
 
-template void cast_tile<Int128>(const Plan&, int, int, int, int, Image&, TileStatistics&);
+template void cast_tile<Int128>(const Plan&, const lanes::EmptySpace*, int, int, int, int, Image&,
+                                TileStatistics&);
 
 }  // namespace squint::model

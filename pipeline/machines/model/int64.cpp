@@ -2,6 +2,7 @@
 
 namespace squint::model {
 
-template void cast_tile<std::int64_t>(const Plan&, int, int, int, int, Image&, TileStatistics&);
+template void cast_tile<std::int64_t>(const Plan&, const lanes::EmptySpace*, int, int, int, int, Image&,
+                                      TileStatistics&);
 
 }  // namespace squint::model

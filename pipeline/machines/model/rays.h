@@ -3,6 +3,7 @@
 #pragma once
 
 #include "core/image.h"
+#include "pipeline/machines/lanes/empty_space.h"
 #include "pipeline/machines/model.h"
 #include "pipeline/plan/plan.h"
 
@@ -10,10 +11,11 @@
 
 namespace squint::model {
 
-/// ModelRenderer::render_tile in words W: std::int64_t, Int128, Audited, Real<float> or Real<double>.
+/// ModelRenderer::render_tile in words W: std::int64_t, Int128, Audited, Real<float> or Real<double>.  `empty`, for
+/// doubles alone: what may be left out; none where it is null.
 template <class W>
-void cast_tile(const Plan& plan, int left, int top, int right, int bottom, Image& image,
-               TileStatistics& statistics);
+void cast_tile(const Plan& plan, const lanes::EmptySpace* empty, int left, int top, int right, int bottom,
+               Image& image, TileStatistics& statistics);
 
 /// The ray of trace.setup in words W: Audited, Real<float> or Real<double>.  `fresh`: where the plan's wires
 /// put what they see; its events go to `trace` slab by slab.

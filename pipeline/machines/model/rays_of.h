@@ -7,6 +7,10 @@
 #include "pipeline/slab-inl.h"
 #include "pipeline/stages/ray_setup-inl.h"
 
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+
 namespace squint::model {
 
 // Notes depths and the first normal of a ray where a picture asks for them.
@@ -57,9 +61,43 @@ class Collector : public Silent {
     std::int64_t current_ = -1;
 };
 
+// How many slabs of a ray of doubles are transparent, by the blocks where they begin.
+class ClearSlabs {
+  public:
+    ClearSlabs(const Plan& plan, const lanes::EmptySpace* empty, const RayWords<Real<double>>& ray)
+        : plan_(plan), empty_(empty), ray_(ray) {
+        double fastest = 0;  // voxels a slab, along any axis
+        for (const Real<double> v : ray.step) fastest = std::max(fastest, std::abs(v.v));
+        slabs_per_voxel_ = power_of_two<double>(plan.location.direction_fraction) / fastest;
+    }
+    std::int64_t operator()(std::int64_t k) const {
+        if (!empty_) return 0;
+        Index3 block;
+        for (int a = 0; a < 3; ++a) {
+            const auto axis = static_cast<std::size_t>(a);
+            const Real<double> place = locate(plan_.location, ray_, constant<Real<double>>(k), a);
+            const std::int64_t cell = to_index(floor_shift(place, plan_.location.location_fraction));
+            block[a] = std::min(cell, plan_.location.last_cell[axis]) >> lanes::kBlockBits;
+        }
+        if (!empty_->box.holds({block, Index3(1)})) return 0;
+        const int distance = empty_->at(block.x, block.y, block.z);
+        if (distance == 0) return 0;
+        // As far as the empty blocks about this one go, less a voxel for roundings.
+        constexpr double kMost = 0x1p30;
+        const double voxels = std::max(lanes::kBlock * (distance - 1) - 1, 0);
+        return 1 + static_cast<std::int64_t>(std::min(voxels * slabs_per_voxel_, kMost));
+    }
+
+  private:
+    const Plan& plan_;
+    const lanes::EmptySpace* empty_;
+    const RayWords<Real<double>>& ray_;
+    double slabs_per_voxel_;
+};
+
 template <class W>
-void cast_tile(const Plan& plan, int left, int top, int right, int bottom, Image& image,
-               TileStatistics& statistics) {
+void cast_tile(const Plan& plan, [[maybe_unused]] const lanes::EmptySpace* empty, int left, int top,
+               int right, int bottom, Image& image, TileStatistics& statistics) {
     // A method's name becomes a type once, outside the loops.
     std::visit(
         [&](const auto& method) {
@@ -68,11 +106,17 @@ void cast_tile(const Plan& plan, int left, int top, int right, int bottom, Image
                     const RaySetup ray = plan.set_up(column, row);
                     Pixel<W> pixel;
                     Aovs<W> aovs(plan, ray.entry_distance, pixel);
-                    cast_ray(plan, method, FromVolume{*plan.volume}, ray_words<W>(plan, ray), ray.slabs, aovs,
-                             pixel);
+                    const RayWords<W> words = ray_words<W>(plan, ray);
+                    const auto clear = [&] {
+                        if constexpr (std::is_same_v<W, Real<double>>)
+                            return ClearSlabs(plan, empty, words);
+                        else
+                            return NothingClear{};
+                    }();
+                    statistics.visited += cast_ray(plan, method, FromVolume{*plan.volume}, words, ray.slabs,
+                                                   aovs, pixel, clear);
                     store(plan, pixel, column, row, image);
-                    statistics.rays += ray.slabs > 0;
-                    statistics.samples += pixel.samples, statistics.visited += pixel.samples;
+                    statistics.rays += ray.slabs > 0, statistics.samples += pixel.samples;
                 }
         },
         plan.method);
