@@ -11,6 +11,7 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <array>
 #include <type_traits>
 
 HWY_BEFORE_NAMESPACE();
@@ -23,6 +24,24 @@ HWY_INLINE auto divide(const N& numerator, const N& denominator, const Rescale& 
     Rescale whole = to;
     whole.shift = std::min(to.shift, 0);
     return quotient(numerator, to.shift > 0 ? N(shift_left(denominator, to.shift)) : denominator, whole);
+}
+
+/// Words that invert a denominator once for several quotients.
+template <class N>
+concept InvertsOnce = requires {
+    typename N::InvertsOnce;
+};
+/// Three quotients by one denominator.
+template <class N>
+HWY_INLINE auto divide_three(const std::array<N, 3>& numerator, const N& denominator, const Rescale& to) {
+    if constexpr (InvertsOnce<N>) {
+        Rescale whole = to;
+        whole.shift = std::min(to.shift, 0);
+        return quotients(numerator, to.shift > 0 ? shift_left(denominator, to.shift) : denominator, whole);
+    } else {
+        return std::array{divide(numerator[0], denominator, to), divide(numerator[1], denominator, to),
+                          divide(numerator[2], denominator, to)};
+    }
 }
 
 /// A divisor: x >= 0, or its last bit where it is zero.  Without rounding every x above zero stays as it is.

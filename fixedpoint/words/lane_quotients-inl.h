@@ -156,6 +156,7 @@ HWY_INLINE std::array<Lanes<T, K>, 3> quotients(const std::array<Lanes<T, K>, 3>
 /// Wide<W> of 32-bit lanes: doubles, for the lower half of the lanes and for the upper one.
 template <KnownRescales K>
 struct WideLanes {
+    using InvertsOnce = void;
     using V = hn::Vec<hn::ScalableTag<double>>;
     V low, high;
 };
@@ -256,18 +257,19 @@ template <KnownRescales K>
 HWY_INLINE bool any_positive(Lanes<std::int64_t, K> x) {
     return any(constant<Lanes<std::int64_t, K>>(0) < x);
 }
+namespace lanes_detail {
 /// An estimate, off by at most one, corrected by its exact remainder: one half of the estimate times the
 /// denominator has at most 53 bits (range.cpp notes it).  Results beyond 32 bits saturate.
 template <KnownRescales K>
-HWY_INLINE Lanes<std::int32_t, K> quotient(const WideLanes<K>& numerator, const WideLanes<K>& denominator,
-                                           const Rescale& to) {
+HWY_INLINE Lanes<std::int32_t, K> quotient_by(const WideLanes<K>& numerator, const WideLanes<K>& denominator,
+                                              const WideLanes<K>& inverse, const Rescale& to) {
     const hn::ScalableTag<double> d;
     const auto one = hn::Set(d, 1.0), zero = hn::Zero(d);
     const auto factor = hn::Set(d, power_of_two<double>(-to.shift));
     const bool to_nearest = to.rounding == Rounding::rnd || to.rounding == Rounding::rnd_conv;
     const auto half = [&](auto part) SQUINT_WRITTEN_OUT {
         const auto below = part(denominator), scaled = hn::Mul(part(numerator), factor);
-        const auto estimate = hn::Mul(scaled, hn::Div(one, below));
+        const auto estimate = hn::Mul(scaled, part(inverse));
         auto q = to_nearest ? hn::Round(estimate) : hn::Trunc(estimate);
 #if (HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2 && HWY_TARGET != HWY_SCALAR) || HWY_ARCH_ARM_A64
         const auto rest = hn::NegMulAdd(q, below, scaled);  // rounds once
@@ -292,8 +294,28 @@ HWY_INLINE Lanes<std::int32_t, K> quotient(const WideLanes<K>& numerator, const 
         q = hn::Sub(q, hn::IfThenElseZero(down, one));
         return hn::Add(q, hn::IfThenElseZero(up, one));
     };
-    const auto q = lanes_detail::narrow(lanes_detail::by_halves<K>(half));
+    const auto q = narrow(by_halves<K>(half));
     return clamp(q, limit_in_lanes<std::int32_t, K>(to.lowest), limit_in_lanes<std::int32_t, K>(to.highest));
+}
+template <KnownRescales K>
+HWY_INLINE WideLanes<K> inverse_of(const WideLanes<K>& x) {
+    const auto one = hn::Set(hn::ScalableTag<double>(), 1.0);
+    return {hn::Div(one, x.low), hn::Div(one, x.high)};
+}
+}  // namespace lanes_detail
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int32_t, K> quotient(const WideLanes<K>& numerator, const WideLanes<K>& denominator,
+                                           const Rescale& to) {
+    return lanes_detail::quotient_by(numerator, denominator, lanes_detail::inverse_of(denominator), to);
+}
+template <KnownRescales K>
+HWY_INLINE std::array<Lanes<std::int32_t, K>, 3> quotients(const std::array<WideLanes<K>, 3>& numerator,
+                                                           const WideLanes<K>& denominator,
+                                                           const Rescale& to) {
+    const WideLanes<K> inverse = lanes_detail::inverse_of(denominator);
+    return {lanes_detail::quotient_by(numerator[0], denominator, inverse, to),
+            lanes_detail::quotient_by(numerator[1], denominator, inverse, to),
+            lanes_detail::quotient_by(numerator[2], denominator, inverse, to)};
 }
 
 }  // namespace squint::HWY_NAMESPACE

@@ -9,6 +9,7 @@
 #include "fixedpoint/cell_table.h"
 #include "fixedpoint/words/lanes-inl.h"
 
+#include <cassert>
 #include <cstring>
 
 HWY_BEFORE_NAMESPACE();
@@ -32,6 +33,52 @@ HWY_INLINE Lanes<std::int64_t, K> gather(const Table& table, Lanes<std::int64_t,
         return {hn::PromoteTo(d, hn::GatherIndex(half, narrow, hn::BitCast(half, at)))};
     }
     return {hn::GatherIndex(d, table.wide(), index.v)};
+}
+
+/// Loads eight bytes at address(lane), a pointer to two words, and parts the first words from the second: half
+/// of what two gathers cost, or less.
+template <class Address>
+HWY_INLINE std::array<hn::Vec<hn::ScalableTag<std::int32_t>>, 2> load_pairs(Address&& address) {
+    const hn::ScalableTag<std::int32_t> d;
+#if HWY_TARGET == HWY_SCALAR
+    const std::int32_t* words = address(0);
+    return {hn::Set(d, words[0]), hn::Set(d, words[1])};
+#else
+    constexpr int kBlocks = static_cast<int>(HWY_LANES(std::int32_t)) / 4;
+    const hn::ScalableTag<std::int64_t> d64;
+    const auto two = [&](int lane) HWY_ATTR {  // `lane` and the second after it
+        const hn::Full64<std::int32_t> pair;
+        return hn::Combine(hn::Full128<std::int32_t>(), hn::LoadU(pair, address(lane + 2)),
+                           hn::LoadU(pair, address(lane)));
+    };
+    const auto block = [&](int j) HWY_ATTR {  // for lanes j and j + 2 of each four
+        if constexpr (kBlocks == 1) {
+            return two(j);
+        } else if constexpr (kBlocks == 2) {
+            return hn::Combine(d, two(4 + j), two(j));
+        } else {
+            const hn::Half<decltype(d)> half;
+            return hn::Combine(d, hn::Combine(half, two(12 + j), two(8 + j)),
+                               hn::Combine(half, two(4 + j), two(j)));
+        }
+    };
+    const auto even = block(0), odd = block(1);
+    const auto low = hn::BitCast(d64, hn::InterleaveLower(d, even, odd)),
+               high = hn::BitCast(d64, hn::InterleaveUpper(d, even, odd));
+    return {hn::BitCast(d, hn::InterleaveLower(d64, low, high)),
+            hn::BitCast(d, hn::InterleaveUpper(d64, low, high))};
+#endif
+}
+/// Rows `row` and `row + 1` of a table of one column.
+template <KnownRescales K>
+HWY_INLINE std::array<Lanes<std::int32_t, K>, 2> load_pair_of_rows(const Table& table,
+                                                                   Lanes<std::int32_t, K> row) {
+    assert(table.columns() == 1);
+    alignas(64) std::int32_t at[HWY_LANES(std::int32_t)];
+    hn::Store(row.v, hn::ScalableTag<std::int32_t>(), at);
+    const std::int32_t* words = table.narrow();
+    const auto pairs = load_pairs([&](int lane) { return words + at[lane]; });
+    return {Lanes<std::int32_t, K>{pairs[0]}, Lanes<std::int32_t, K>{pairs[1]}};
 }
 
 /// The lower and the upper halves of 32-bit words, unsigned.

@@ -30,15 +30,28 @@ HWY_INLINE W classification_input(const InputStage& s, W sample) {
     return clamp(quantise(sample, s.to_input), constant<W>(0), constant<W>(s.highest));
 }
 
+/// Words that load two rows of a table of one column at once.
+template <class W>
+concept LoadsPairs = requires(const Table& table, W word) {
+    { load_pair_of_rows(table, word) } -> std::same_as<std::array<W, 2>>;
+};
+/// Rows `row` and `row + 1` of a table of one column.
+template <class W>
+HWY_INLINE std::array<W, 2> two_rows(const Table& table, W row) {
+    if constexpr (LoadsPairs<W>)
+        return load_pair_of_rows(table, row);
+    else
+        return {gather(table, row, 0), gather(table, row + constant<W>(1), 0)};
+}
+
 template <class W>
 HWY_INLINE W opacity_of_depth(const OpacityUnit& unit, W depth) {
     const int fraction = unit.depth_fraction - unit.row_bits;
     const W row = min(floor_shift(depth, fraction), constant<W>(unit.rows.rows() - 2));
     const std::int64_t one = std::int64_t{1} << fraction;
     const W rest = within(min(depth - shift_left(row, fraction), constant<W>(one)), 0, one);
-    return quantise(
-        blend(gather(unit.rows, row, 0), gather(unit.rows, row + constant<W>(1), 0), rest, fraction),
-        unit.to_alpha);
+    const std::array<W, 2> ends = two_rows(unit.rows, row);
+    return quantise(blend(ends[0], ends[1], rest, fraction), unit.to_alpha);
 }
 /// 1 - exp(-x) for x >= 0 in float32.  With -x = n ln 2 + r, |r| <= ln 2 / 2, exp(r) - 1 is its series to
 /// r^7, which is off by at most 2^-26 of r.
@@ -60,10 +73,9 @@ inline Real<double> one_minus_exp(Real<double> x) {
 /// Without rounding: the function itself, where its result is not rounded either.
 template <RealWord W>
 HWY_INLINE W opacity_of_depth(const OpacityUnit& unit, W depth) {
-    Rescale raw = unit.to_alpha;
-    raw.shift = 0;
-    return quantise(shift_left(one_minus_exp(shift_left(depth, -unit.depth_fraction)), unit.alpha_fraction),
-                    raw);
+    return quantise_raw(
+        shift_left(one_minus_exp(shift_left(depth, -unit.depth_fraction)), unit.alpha_fraction),
+        unit.to_alpha);
 }
 
 /// The position of an input between two entries.

@@ -71,10 +71,12 @@ HWY_INLINE Slab<W> classify(const PowerSeriesOfOrder1& m, const PrefixSample<W>&
                                       depth_of(m.prefix, depth, widen(divisor<W>(cut.span)), length));
     if (any(zero < slab.alpha)) {  // an invisible slab may have any colour
         const Wide<W> some = divisor<W>(absolute(straight));
-        for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
-            const Wide<W> colored = absolute(prefix_difference(front, end, c + 1, bits));
-            slab.color[c] = min(divide(colored, some, m.to_ratio), one);
-        });
+        const auto colored = [&](std::size_t c) SQUINT_WRITTEN_OUT {
+            return absolute(prefix_difference(front, end, c + 1, bits));
+        };
+        slab.color =
+            divide_three(std::array<Wide<W>, 3>{colored(0), colored(1), colored(2)}, some, m.to_ratio);
+        for_three([&](std::size_t c) SQUINT_WRITTEN_OUT { slab.color[c] = min(slab.color[c], one); });
     }
     return finish_straight(m.prefix, cut, front.input, length, slab);
 }
