@@ -10,10 +10,31 @@
 
 #include <hwy/highway.h>
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
-/// The order of lanes, computed once: g++ 12 copies the table behind Highway's Compress at every use.
+#if HWY_TARGET <= HWY_AVX3
+inline constexpr bool kCompresses = true;  // by an instruction
+#else
+inline constexpr bool kCompresses = HWY_LANES(lanes::Word) > 8;
+#endif
+
+/// The wanted lanes' numbers for every mask of eight, a byte each; zeros after them.
+inline constexpr std::array<std::array<std::uint8_t, 8>, 256> kWantedLanes = [] {
+    std::array<std::array<std::uint8_t, 8>, 256> lanes{};
+    for (std::size_t mask = 0; mask < lanes.size(); ++mask) {
+        std::size_t count = 0;
+        for (std::size_t lane = 0; lane < 8; ++lane)
+            if (mask >> lane & 1) lanes[mask][count++] = static_cast<std::uint8_t>(lane);
+    }
+    return lanes;
+}();
+
+/// The order of lanes, computed once: g++ 12 copies the table behind Highway's Compress at every use, all 2 KiB.
 class Packing {
     using D = hwy::HWY_NAMESPACE::ScalableTag<lanes::Word>;
 
@@ -32,11 +53,19 @@ class Packing {
   private:
     using Indices = decltype(hwy::HWY_NAMESPACE::IndicesFromVec(D(), hwy::HWY_NAMESPACE::Zero(D())));
     template <class Mask>
-    static HWY_INLINE Indices order_of(Mask wanted, int count) {
+    static HWY_INLINE Indices order_of(Mask wanted, [[maybe_unused]] int count) {
         namespace hn = hwy::HWY_NAMESPACE;
-        const auto packed = hn::Compress(hn::Iota(D(), 0), wanted);
-        return hn::IndicesFromVec(
-            D(), hn::IfThenElseZero(hn::FirstN(D(), static_cast<std::size_t>(count)), packed));
+        if constexpr (kCompresses) {
+            const auto packed = hn::Compress(hn::Iota(D(), 0), wanted);
+            return hn::IndicesFromVec(
+                D(), hn::IfThenElseZero(hn::FirstN(D(), static_cast<std::size_t>(count)), packed));
+        } else {
+            std::uint8_t bits[8] = {};
+            hn::StoreMaskBits(D(), wanted, bits);
+            const hn::Rebind<std::uint8_t, D> bytes;
+            return hn::IndicesFromVec(D(),
+                                      hn::PromoteTo(D(), hn::LoadU(bytes, kWantedLanes[bits[0]].data())));
+        }
     }
     int count_;
     Indices from_;
