@@ -79,7 +79,7 @@ struct StageKernels {
     /// Joins their lit pieces to one colour each.
     void (*join)(const Plan&, const LitSamples& pieces, int bits, LitSamples& slabs, int at) = nullptr;
     /// Loads the voxels around the first `count` packed samples, as many as the gradient rule needs.
-    void (*fetch_lit)(const Plan&, int count, LitSamples&) = nullptr;
+    void (*fetch_lit)(const Plan&, const VoxelSource&, int count, LitSamples&) = nullptr;
     /// In place of fetch_lit, for gradients from samples: rows [0, rows) of 16 packed samples each get the
     /// cells and weights one voxel further along an axis.
     void (*step_aside)(const Plan&, const LitSamples&, int axis, bool ahead, int rows, Samples&) = nullptr;

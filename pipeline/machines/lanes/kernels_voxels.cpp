@@ -173,15 +173,9 @@ HWY_INLINE Words gathered_inner_pair(const std::uint8_t* row, Words first) {
     return hn::Or(hn::And(hn::ShiftRight<8>(four), hn::Set(d, 0xff)), hn::And(four, hn::Set(d, 0xff0000)));
 }
 HWY_INLINE std::array<Words, 2> gathered_row(const std::uint16_t* row, Words first) {
-    const hn::ScalableTag<Word> d;
-    const hn::ScalableTag<std::int64_t> d64;
-    const hn::Half<decltype(d)> half;
-    const auto fours = [&](auto part) HWY_ATTR {
-        const auto offset = hn::ShiftLeft<1>(hn::PromoteTo(d64, part));
-        return hn::BitCast(d, hn::GatherOffset(d64, reinterpret_cast<const std::int64_t*>(row), offset));
-    };
-    const auto low = fours(hn::LowerHalf(half, first)), high = fours(hn::UpperHalf(half, first));
-    return {hn::ConcatEven(d, high, low), hn::ConcatOdd(d, high, low)};
+    alignas(64) Word at[kLanes];
+    hn::Store(first, hn::ScalableTag<Word>(), at);
+    return load_pairs([&](int lane) { return reinterpret_cast<const Word*>(row + at[lane]); });
 }
 HWY_INLINE Words gathered_inner_pair(const std::uint16_t* row, Words first) {
     return hn::GatherOffset(hn::ScalableTag<Word>(), reinterpret_cast<const Word*>(row + 1),
@@ -199,8 +193,77 @@ Words gathered_inner_pair(const T*, Words) {
 }
 #endif
 
+/// The rows around a vector of cells that central differences need, from the cells beside each: of those, an
+/// interpolated sample's neighbours have lately been read, and a row of the volume itself may be far.
 template <class T>
-void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
+class CellsBeside {
+    using D = hn::ScalableTag<Word>;
+    static constexpr int kBits = lanes::CellBlocks::kBits;
+
+  public:
+    explicit CellsBeside(const VoxelSource& source) : cells_(source.cells), places_(source) {}
+
+    /// Stores rows of cells `at` and on in `pair`, as LitSamples has them; lanes from `here` on repeat the first.
+    /// All lie at least one voxel from a face.  Returns whether it could: else some cell is not built.
+    HWY_INLINE bool operator()(const lanes::Batch (&cell)[3], int at, int here,
+                               lanes::Batch (&pair)[32]) const {
+        const D d;
+        const auto wanted = hn::FirstN(d, static_cast<std::size_t>(here));
+        Words place[3];
+        for (int a = 0; a < 3; ++a)
+            place[a] = hn::IfThenElse(wanted, hn::Load(d, cell[a].v + at), hn::Set(d, cell[a].v[at]));
+        const Words middle = places_(place[0], place[1], place[2]);
+        alignas(64) Word beside[3][2][kLanes];
+        auto missing = hn::Lt(middle, hn::Zero(d));
+        for (int a = 0; a < 3; ++a)
+            for (const int ahead : {0, 1}) {
+                const Words there = next_to(place, middle, a, ahead != 0);
+                missing = hn::Or(missing, hn::Lt(there, hn::Zero(d)));
+                hn::Store(there, d, beside[a][ahead]);
+            }
+        if (!hn::AllFalse(d, missing)) return false;
+        const auto store_row = [&](Words words, int y, int z, int half) {
+            hn::Store(words, d, pair[(z * 4 + y) * 2 + half].v + at);
+        };
+        for (const int ahead : {0, 1}) {
+            const auto x = corners(beside[0][ahead]);
+            for (int row = 0; row < 4; ++row)
+                store_row(x[static_cast<std::size_t>(row)], 1 + row % 2, 1 + row / 2, ahead);
+            const auto y = corners(beside[1][ahead]);
+            store_row(ahead ? y[1] : y[0], 3 * ahead, 1, 0), store_row(ahead ? y[3] : y[2], 3 * ahead, 2, 0);
+            const auto z = corners(beside[2][ahead]);
+            store_row(ahead ? z[2] : z[0], 1, 3 * ahead, 0), store_row(ahead ? z[3] : z[1], 2, 3 * ahead, 0);
+        }
+        return true;
+    }
+
+  private:
+    HWY_INLINE Words next_to(const Words (&cell)[3], Words middle, int axis, bool ahead) const {
+        const D d;
+        const Word inner = (1 << kBits) - 1, step = ahead ? 1 : -1;
+        const auto edge = hn::Set(d, ahead ? inner : 0);
+        const auto leaves = hn::Eq(hn::And(cell[axis], hn::Set(d, inner)), edge);
+        const Words there = hn::Add(middle, hn::Set(d, step * (1 << kBits * axis)));
+        if (hn::AllFalse(d, leaves)) return there;
+        const auto along = [&](int a) { return a == axis ? hn::Add(cell[a], hn::Set(d, step)) : cell[a]; };
+        return hn::IfThenElse(leaves, places_(along(0), along(1), along(2)), there);
+    }
+    HWY_INLINE auto corners(const Word* place) const {
+        const auto address = [&](int lane) {
+            return cells_ + std::int64_t{place[lane]} * static_cast<std::int64_t>(8 * sizeof(T));
+        };
+        if constexpr (sizeof(T) == 1)
+            return load_widened_quads(address);
+        else
+            return load_quads(address);
+    }
+
+    const std::uint8_t* cells_;
+    CellPlaces places_;
+};
+
+template <class T>
+void fetch_lit_samples(const Plan& plan, const VoxelSource& source, int count, lanes::LitSamples& lit) {
     const Volume& volume = *plan.volume;
     const hn::ScalableTag<Word> d;
     const Index3 n = volume.dims;
@@ -211,8 +274,10 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
     const auto wants_inner = [cross = plan.gradient.rule == GradientRule::central](int row) {
         return cross && lanes::is_outer_row(row % 4, row / 4);
     };
+    const bool from_cells = source.cells && plan.gradient.rule == GradientRule::central;
+    const CellsBeside<T> cells_beside(source);
     for (int at = 0; at < count; at += kLanes) {
-        lanes::Batch* pair = lit.pair;
+        auto& pair = lit.pair;
         const auto& cell = lit.cell;
         auto outside = hn::Lt(hn::Load(d, cell[0].v + at), hn::Set(d, 1));
         for (int a = 0; a < 3; ++a) {
@@ -223,6 +288,7 @@ void fetch_lit_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
         const int here = std::min(kLanes, count - at);  // lanes past the last sample repeat the first
         outside = hn::And(outside, hn::FirstN(d, static_cast<std::size_t>(here)));
         if (hn::AllFalse(d, outside)) {
+            if (from_cells && cells_beside(cell, at, here, pair)) continue;
             if (kGathersRows && offsets_fit) {
                 auto first = hn::Sub(hn::Load(d, cell[2].v + at), hn::Set(d, 1));
                 for (const int a : {1, 0})

@@ -361,7 +361,7 @@ class PacketLoop {
     // Fetches what the gradients of the first `count` packed places need: voxels, or the six samples around
     // each place.
     void look_around(int count, LitSamples& lit) {
-        if (!plan_.gradient_from_samples()) return kernels_.fetch_lit(plan_, count, lit);
+        if (!plan_.gradient_from_samples()) return kernels_.fetch_lit(plan_, voxels_, count, lit);
         const int rows = (count + kRays - 1) / kRays;
         for (int axis = 0; axis < 3; ++axis)
             for (const bool ahead : {false, true}) {

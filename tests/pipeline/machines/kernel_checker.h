@@ -183,7 +183,7 @@ class KernelChecker {
         add(
             "fetch_lit, find_gradients and find_normals", [this] { draw_lit(); },
             [this] {
-                kernels_.fetch_lit(plan_, count_, *lit_);
+                kernels_.fetch_lit(plan_, c_.source, count_, *lit_);
                 kernels_.find_gradients(plan_, count_, *lit_);
                 kernels_.find_normals(plan_, count_, *lit_);
             },
@@ -385,8 +385,11 @@ class KernelChecker {
         if (auto text = locate_difference(rows); !text.empty()) return text;
         before_ = *samples_;
         kernels_.prefetch(c_.source, 0, rows, *samples_);
+        const auto place = [](const Samples& s, int i) {
+            return std::max(s.place.v[i], -1);
+        };  // none is none
         return first_of(rows * kRays,
-                        [&](int i) { return differs("place", i, samples_->place.v[i], before_.place.v[i]); });
+                        [&](int i) { return differs("place", i, place(*samples_, i), place(before_, i)); });
     }
     std::string sample_difference(int rows) {
         using namespace squint::HWY_NAMESPACE;
