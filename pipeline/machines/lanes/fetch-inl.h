@@ -12,6 +12,8 @@
 
 #include <hwy/highway.h>
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 
 HWY_BEFORE_NAMESPACE();
@@ -36,25 +38,94 @@ class CellPlaces {
     HWY_INLINE explicit CellPlaces(const lanes::VoxelSource& source)
         : slots_(source.slots.data()),
           row_(static_cast<lanes::Word>(source.blocks.x)),
-          slice_(static_cast<lanes::Word>(source.blocks.x * source.blocks.y)) {}
+          slice_(static_cast<lanes::Word>(source.blocks.x * source.blocks.y)),
+          last_{static_cast<lanes::Word>(source.blocks.x - 1), static_cast<lanes::Word>(source.blocks.y - 1),
+                static_cast<lanes::Word>(source.blocks.z - 1)},
+          are_few_(source.blocks.x + (source.blocks.y << kBits) + (source.blocks.z << 2 * kBits) <
+                   1 << (29 - kBits)) {}
 
     /// Of cells (x, y, z): among all cells, or -1 where there is none.
     HWY_INLINE Words operator()(Words x, Words y, Words z) const {
         const hn::ScalableTag<lanes::Word> d;
-        const auto in_block = hn::Set(d, (1 << kBits) - 1), row = hn::Set(d, row_),
-                   slice = hn::Set(d, slice_);
-        const auto block = hn::Add(
-            hn::ShiftRight<kBits>(x),
-            hn::Add(hn::Mul(row, hn::ShiftRight<kBits>(y)), hn::Mul(slice, hn::ShiftRight<kBits>(z))));
+        const auto in_block = hn::Set(d, (1 << kBits) - 1);
+        const auto slot =
+            slot_of(hn::ShiftRight<kBits>(x), hn::ShiftRight<kBits>(y), hn::ShiftRight<kBits>(z));
         const auto offset =
             hn::Or(hn::And(x, in_block), hn::Or(hn::ShiftLeft<kBits>(hn::And(y, in_block)),
                                                 hn::ShiftLeft<2 * kBits>(hn::And(z, in_block))));
-        return hn::Or(hn::GatherIndex(d, slots_, block), offset);  // -1 stays -1
+        return hn::Or(slot, offset);  // -1 stays -1
     }
 
   private:
+    friend class NearPlaces;
+    /// Of blocks (x, y, z).
+    HWY_INLINE Words slot_of(Words x, Words y, Words z) const {
+        const hn::ScalableTag<lanes::Word> d;
+        const auto block = hn::Add(x, hn::Add(hn::Mul(hn::Set(d, row_), y), hn::Mul(hn::Set(d, slice_), z)));
+        return hn::GatherIndex(d, slots_, block);
+    }
+
     const std::int32_t* slots_;
-    lanes::Word row_, slice_;
+    lanes::Word row_, slice_, last_[3];  // last_: the last block along each axis
+    bool are_few_;                       // see NearPlaces::kNotThere
+};
+
+/// Places of cells in at most two neighbouring blocks along each axis, whose slots fit a register: a gather costs
+/// as much as all else that stage 1 does.
+class NearPlaces {
+    static constexpr int kBits = lanes::CellBlocks::kBits;
+    using D = hn::ScalableTag<lanes::Word>;
+    using Words = hn::Vec<D>;
+
+  public:
+    static constexpr bool kFits = HWY_LANES(lanes::Word) >= 8;
+
+    HWY_INLINE NearPlaces() : starts_(hn::Zero(D())) {}
+
+    /// Takes the slots of the blocks between cells `low` and `high`, each of some lane.  Returns false, and takes
+    /// none, where they are more blocks.
+    HWY_INLINE bool take(const CellPlaces& places, const std::array<Words, 3>& low,
+                         const std::array<Words, 3>& high) {
+        const D d;
+        if (!places.are_few_) return false;
+        const auto one = hn::Set(d, 1);
+        const auto block_of = [&](Words cell) HWY_ATTR { return hn::ShiftRight<kBits>(cell); };
+        const auto first_of = [&](std::size_t a) HWY_ATTR { return hn::MinOfLanes(d, block_of(low[a])); };
+        const Words first[3] = {first_of(0), first_of(1), first_of(2)};
+        const auto beyond = [&](std::size_t a)
+                                HWY_ATTR { return hn::Gt(hn::Sub(block_of(high[a]), first[a]), one); };
+        if (!hn::AllFalse(d, hn::Or(beyond(0), hn::Or(beyond(1), beyond(2))))) return false;
+        // Lane i is for blocks whose number along axis a is odd where bit a of i is set.
+        const auto lane = hn::Iota(d, 0);
+        const auto along = [&](std::size_t a, Words odd) HWY_ATTR {
+            return hn::Min(hn::Add(first[a], hn::And(hn::Xor(first[a], odd), one)),
+                           hn::Set(d, places.last_[a]));
+        };
+        const Words x = along(0, lane), y = along(1, hn::ShiftRight<1>(lane)),
+                    z = along(2, hn::ShiftRight<2>(lane));
+        const auto slot = places.slot_of(x, y, z);
+        const auto to_corner = hn::ShiftLeft<kBits>(joined(x, y, z));
+        starts_ = hn::IfThenElse(hn::Lt(slot, hn::Zero(d)), hn::Set(d, kNotThere), hn::Sub(slot, to_corner));
+        return true;
+    }
+
+    /// Of cells (x, y, z) among those: among all cells, or below zero where there is none.
+    HWY_INLINE Words operator()(Words x, Words y, Words z) const {
+        const D d;
+        const auto odd = hn::Set(d, 1 << kBits);
+        const auto block = hn::Or(
+            hn::And(x, odd), hn::Or(hn::ShiftLeft<1>(hn::And(y, odd)), hn::ShiftLeft<2>(hn::And(z, odd))));
+        const auto start = hn::TableLookupLanes(starts_, hn::IndicesFromVec(d, hn::ShiftRight<kBits>(block)));
+        return hn::Add(start, joined(x, y, z));
+    }
+
+  private:
+    static constexpr lanes::Word kNotThere = -0x40000000;  // stays below zero for any of few blocks' cells
+    /// What one more along an axis adds inside a block.
+    static HWY_INLINE Words joined(Words x, Words y, Words z) {
+        return hn::Add(x, hn::Add(hn::ShiftLeft<kBits>(y), hn::ShiftLeft<2 * kBits>(z)));
+    }
+    Words starts_;  // where the first cell of the volume would lie if all were in this block
 };
 
 /// Asks memory for the cells of a row of samples that have their places: the outermost rays', or every ray's

@@ -19,10 +19,47 @@ namespace {
 
 using lanes::kRays;
 
-/// Stage 1.  take_cell(at, cell): what else is to be done with the cells of samples `at` and on.
+/// Leaves cells alone.
+struct TakesNoCells {
+    template <class L>
+    HWY_INLINE void between(const std::array<L, 3>&, const std::array<L, 3>&) const {}
+    HWY_INLINE void anywhere() const {}
+    template <class L>
+    HWY_INLINE void operator()(int, const std::array<L, 3>&) const {}
+};
+/// Stores the places of samples' cells.
+class TakesPlaces {
+  public:
+    HWY_INLINE TakesPlaces(const lanes::VoxelSource& source, lanes::Samples& out)
+        : places_(source), out_(out) {}
+
+    /// Cells to come lie between these, lane by lane; or anywhere.
+    template <class L>
+    HWY_INLINE void between(const std::array<L, 3>& low, const std::array<L, 3>& high) {
+        if constexpr (NearPlaces::kFits)
+            are_near_ =
+                near_.take(places_, {low[0].v, low[1].v, low[2].v}, {high[0].v, high[1].v, high[2].v});
+    }
+    HWY_INLINE void anywhere() { are_near_ = false; }
+    /// Samples `at` and on have these cells.
+    template <class L>
+    HWY_INLINE void operator()(int at, const std::array<L, 3>& cell) const {
+        if constexpr (NearPlaces::kFits)
+            if (are_near_) return store_whole(L{near_(cell[0].v, cell[1].v, cell[2].v)}, out_.place.v + at);
+        store_whole(L{places_(cell[0].v, cell[1].v, cell[2].v)}, out_.place.v + at);
+    }
+
+  private:
+    CellPlaces places_;
+    NearPlaces near_;
+    bool are_near_ = false;
+    lanes::Samples& out_;
+};
+
+/// Stage 1.  `take_cell`: what else is to be done with cells.
 template <class L, bool kKeepsLocation, class TakeCell>
 HWY_INLINE void locate_into(const Plan& plan, const lanes::RayPacket& packet, int from, int to,
-                            lanes::Samples& out, const TakeCell& take_cell) {
+                            lanes::Samples& out, TakeCell take_cell) {
     const LocationStage stage = plan.location;  // a copy: no store can change it
     const L full = constant<L>(std::int64_t{1} << stage.length_fraction);
     for (int r = 0; r < kRays; r += static_cast<int>(L::count())) {
@@ -53,13 +90,18 @@ HWY_INLINE void locate_into(const Plan& plan, const lanes::RayPacket& packet, in
             // A batch that ends before any ray's last slab, both ends inside the box: nothing is clamped.
             const L rows = constant<L>(to - from - 1);
             auto leaves = (constant<L>(0) < slabs) & !(constant<L>(out.first + to - 1) < last_slab);
+            std::array<L, 3> low, high;
             for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
                 const L begin = rounded_inside(stage, exact[a]),
                         end = rounded_inside(stage, exact[a] + rows * strides[a]);
-                leaves = leaves | (min(begin, end) < constant<L>(0)) |
-                         !(max(begin, end) < constant<L>(stage.limit[a]));
+                low[a] = min(begin, end), high[a] = max(begin, end);
+                leaves = leaves | (low[a] < constant<L>(0)) | !(high[a] < constant<L>(stage.limit[a]));
             });
             if (!any(leaves)) {
+                const auto cells_of = [&](const std::array<L, 3>& at) {
+                    return cell_position_inside(stage, at).cell;
+                };
+                take_cell.between(cells_of(low), cells_of(high));
                 for (int at = from * kRays + r; at < to * kRays; at += kRays) {
                     for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
                         location[a] = rounded_inside(stage, exact[a]);
@@ -70,6 +112,7 @@ HWY_INLINE void locate_into(const Plan& plan, const lanes::RayPacket& packet, in
                 continue;
             }
         }
+        take_cell.anywhere();
         for (int row = from; row < to; ++row) {
             const int at = row * kRays + r;
             const L k = constant<L>(out.first + row);
@@ -85,16 +128,12 @@ HWY_INLINE void locate_into(const Plan& plan, const lanes::RayPacket& packet, in
 
 template <class L, bool kKeepsLocation>
 void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int to, lanes::Samples& out) {
-    locate_into<L, kKeepsLocation>(plan, packet, from, to, out, [](int, const std::array<L, 3>&) {});
+    locate_into<L, kKeepsLocation>(plan, packet, from, to, out, TakesNoCells{});
 }
 template <class L, bool kKeepsLocation>
 void locate_and_address_rows(const Plan& plan, const lanes::VoxelSource& source,
                              const lanes::RayPacket& packet, int from, int to, lanes::Samples& out) {
-    const CellPlaces places(source);
-    locate_into<L, kKeepsLocation>(
-        plan, packet, from, to, out, [&](int at, const std::array<L, 3>& cell) SQUINT_WRITTEN_OUT {
-            store_whole(L{places(cell[0].v, cell[1].v, cell[2].v)}, out.place.v + at);
-        });
+    locate_into<L, kKeepsLocation>(plan, packet, from, to, out, TakesPlaces(source, out));
 }
 
 template <class L>
