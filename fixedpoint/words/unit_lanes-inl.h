@@ -7,10 +7,12 @@
 #define SQUINT_FIXEDPOINT_WORDS_UNIT_LANES_INL_H
 #endif
 
+#include "fixedpoint/unrolled-inl.h"
 #include "fixedpoint/words/lanes-inl.h"
 
 #include <array>
 #include <cassert>
+#include <cstddef>
 #include <cstdint>
 
 HWY_BEFORE_NAMESPACE();
@@ -84,6 +86,14 @@ inline constexpr std::size_t kPartsOfUnits = UnitLanes::count() / L::count();
 template <class L>
 using UnitParts = std::array<L, kPartsOfUnits<L>>;
 
+/// Calls f(i) for each part, written out: see unrolled-inl.h.
+template <class L, class F>
+HWY_INLINE void for_parts(F&& f) {
+    static_assert(kPartsOfUnits<L> <= 2);
+    f(std::size_t{0});
+    if constexpr (kPartsOfUnits<L> == 2) f(std::size_t{1});
+}
+
 /// Words of 32 bits that fit 16, in the order of UnitLanes; and back.
 template <class L>
 HWY_INLINE hn::Vec<UnitLanes::D> narrow_words(const UnitParts<L>& x) {
@@ -107,13 +117,13 @@ HWY_INLINE UnitParts<L> widen_words(hn::Vec<UnitLanes::D> x) {
 template <class L>
 HWY_INLINE UnitLanes units_of(const UnitParts<L>& x) {
     UnitParts<L> below;
-    for (std::size_t i = 0; i < kPartsOfUnits<L>; ++i) below[i] = constant<L>(0) - x[i];
+    for_parts<L>([&](std::size_t i) SQUINT_WRITTEN_OUT { below[i] = constant<L>(0) - x[i]; });
     return {narrow_words<L>(below)};
 }
 template <class L>
 HWY_INLINE UnitParts<L> words_of(UnitLanes x) {
     UnitParts<L> words = widen_words<L>(x.v);
-    for (L& word : words) word = constant<L>(0) - word;
+    for_parts<L>([&](std::size_t i) SQUINT_WRITTEN_OUT { words[i] = constant<L>(0) - words[i]; });
     return words;
 }
 #else

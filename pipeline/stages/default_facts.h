@@ -41,6 +41,8 @@ using DefaultCompositing =
 using UnitCompositing = DefaultCompositing::And<
     Is<&CompositingStage::of_units, true>, Is<&CompositingStage::alpha_fraction, 15>,
     Is<&CompositingStage::color_fraction, 15>, Is<&CompositingStage::transparency_fraction, 15>,
+    Is<&CompositingStage::contribution_fraction,
+       15>,  // a constant: Same alone leaves a shift by the difference
     DropsBits<&CompositingStage::to_contribution, 15>, DropsBits<&CompositingStage::to_color, 15>,
     Rounds<&CompositingStage::to_contribution, Rounding::rnd_conv>,
     Rounds<&CompositingStage::to_color, Rounding::rnd_conv>>;

@@ -40,11 +40,11 @@ using Parts = UnitParts<L>;
 
 HWY_INLINE Parts load_parts(const lanes::Word* from) {
     Parts parts;
-    for (std::size_t i = 0; i < parts.size(); ++i) parts[i] = load<L>(from + i * L::count());
+    for_parts<L>([&](std::size_t i) SQUINT_WRITTEN_OUT { parts[i] = load<L>(from + i * L::count()); });
     return parts;
 }
 HWY_INLINE void store_parts(const Parts& parts, lanes::Word* to) {
-    for (std::size_t i = 0; i < parts.size(); ++i) store(parts[i], to + i * L::count());
+    for_parts<L>([&](std::size_t i) SQUINT_WRITTEN_OUT { store(parts[i], to + i * L::count()); });
 }
 
 /// Colours and opacities stay in registers, and are composited in 16 bits.
@@ -73,15 +73,16 @@ void classify_and_composite_points(const Plan& plan, const lanes::RayPacket& pac
             const int at = step * lanes::kRays + r;
             const Parts input = load_parts(samples.input.v + at), length = load_parts(samples.length.v + at);
             bool seen = false;
-            for (const L& part : input) seen |= !unseen.holds(part, part);
+            for_parts<L>([&](std::size_t i)
+                             SQUINT_WRITTEN_OUT { seen |= !unseen.holds(input[i], input[i]); });
             if (!seen) continue;
             std::array<Parts, 3> color;
             Parts opacity;
-            for (std::size_t i = 0; i < input.size(); ++i) {
+            for_parts<L>([&](std::size_t i) SQUINT_WRITTEN_OUT {
                 const Slab<L> slab = points.classify(input[i], length[i]);
                 for_three([&](std::size_t c) SQUINT_WRITTEN_OUT { color[c][i] = slab.color[c]; });
                 opacity[i] = slab.alpha;
-            }
+            });
             // Transparent slabs change nothing: those of rays that have ended, too.
             const U alpha = only(active, units_of<L>(opacity));
             take_contribution(stage, pixel,
