@@ -108,6 +108,12 @@ int run(const PlanArguments& a) {
     text += plan.skips_empty_space
                 ? "empty space: skipped where it can be\n"
                 : "empty space: visited, since a transparent sample is not the identity here\n";
+    if (const std::optional<RefinedRays> found = refined_rays(plan)) {
+        const std::string refined = text_of(found->refined, found->slabs);
+        text += fmt::format("slabs refined: {} of {}, on {} rays that were cast\n",
+                            refined.empty() ? "none" : refined, text_of_count(found->slabs),
+                            text_of_count(found->rays));
+    }
     for (const std::string& note : plan.notes) text += "note: " + note + "\n";
     for (const std::string& warning : plan.warnings) text += "warning: " + warning + "\n";
     print(text);

@@ -6,6 +6,7 @@
 #include "core/preview.h"
 #include "core/text.h"
 #include "pipeline/machines/certificate.h"
+#include "pipeline/plan_record.h"
 #include "pipeline/record.h"
 #include "scene/presets.h"
 #include "truth/reference.h"
@@ -272,6 +273,8 @@ Json render_frame(const Job& job, int frame) {
                         plan.camera.width, plan.camera.height, s.path, s.why, s.seconds,
                         text_of_count(s.samples), text_of_count(s.rays), s.threads,
                         s.threads == 1 ? "" : "s"));
+        if (const std::string refined = text_of(s.refined, s.visited); !refined.empty())
+            say(fmt::format("  slabs refined: {} of {}\n", refined, text_of_count(s.visited)));
         for (const std::string& warning : warnings)
             say(fmt::format("  warning: {}\n", message_text(warning)));
         if (measured) say(error_text(errors));

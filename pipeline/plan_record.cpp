@@ -1,11 +1,16 @@
 #include "pipeline/plan_record.h"
 
 #include "pipeline/machines/lanes/lane_renderer.h"
+#include "pipeline/machines/model.h"
+#include "pipeline/plan/ranges.h"
 #include "pipeline/record.h"
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <string_view>
 
 namespace squint {
@@ -24,6 +29,14 @@ struct FindTables {
             {std::string(name), table.rows(), table.columns(), static_cast<std::int64_t>(table.bytes()), {}});
     }
 };
+
+Json json_of_refined(const Plan& plan) {
+    const std::optional<RefinedRays> found = refined_rays(plan);
+    if (!found) return nullptr;
+    Json json = json_of(found->refined);
+    json["rays"] = found->rays, json["slabs"] = found->slabs;
+    return json;
+}
 
 }  // namespace
 
@@ -46,6 +59,36 @@ std::optional<int> lane_bits(const Plan& plan, std::size_t stage) {
 PathOf path_of(const Plan& plan) {
     if (const auto obstacle = lanes::what_needs_the_model(plan)) return {"model", *obstacle};
     return {"lanes", lanes::words_in_lanes(plan)};
+}
+
+std::optional<RefinedRays> refined_rays(const Plan& plan) {
+    if (!plan.walls.looks_twice && !(plan.lit && plan.inside.rule == InsideRule::adaptive)) return {};
+    constexpr double kMostSlabs = 1 << 18;
+    const int side = std::clamp(static_cast<int>(std::sqrt(kMostSlabs / most_steps(plan))), 1, 16);
+    const ModelRenderer model(plan);
+    Image image;
+    image.width = plan.camera.width, image.height = plan.camera.height;
+    for (const char* name : {"R", "G", "B", "A"}) image.add_float(name);
+    TileStatistics statistics;
+    const int wide = std::min(side, image.width), high = std::min(side, image.height);
+    for (int i = 0; i < wide; ++i)
+        for (int j = 0; j < high; ++j) {
+            const int x = (2 * i + 1) * image.width / (2 * wide), y = (2 * j + 1) * image.height / (2 * high);
+            model.render_tile(x, y, x + 1, y + 1, image, statistics);
+        }
+    return RefinedRays{statistics.rays, statistics.samples, statistics.refined};
+}
+
+std::string text_of(const RefinedSlabs& refined, std::int64_t slabs) {
+    std::string text;
+    const auto add = [&](std::int64_t count, const char* what) {
+        if (count == 0) return;
+        text += fmt::format("{}{:.2g} % {}", text.empty() ? "" : ", ",
+                            100 * static_cast<double>(count) / static_cast<double>(slabs), what);
+    };
+    add(refined.looked_twice, "looked at twice"), add(refined.in_two, "lit in two pieces"),
+        add(refined.in_four, "in four");
+    return text;
 }
 
 Json json_of_plan(const Plan& plan) {
@@ -82,6 +125,7 @@ Json json_of_plan(const Plan& plan) {
             {"wires", wires},
             {"tables", tables},
             {"memory", json_of(memory_of(plan, {}))},
+            {"refined", json_of_refined(plan)},
             {"notes", plan.notes},
             {"warnings", plan.warnings}};
 }

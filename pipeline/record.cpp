@@ -285,6 +285,10 @@ Json json_of_audit(const Plan& plan, const RenderStatistics& statistics) {
     return json;
 }
 
+Json json_of(const RefinedSlabs& refined) {
+    return {{"looked_twice", refined.looked_twice}, {"in_two", refined.in_two}, {"in_four", refined.in_four}};
+}
+
 Json json_of(const Plan& plan, const Rendering& rendering, const Errors* errors, bool audit) {
     const RenderStatistics& s = rendering.statistics;
     Json json{{"hash", picture_hash(rendering.image)},
@@ -293,6 +297,7 @@ Json json_of(const Plan& plan, const Rendering& rendering, const Errors* errors,
               {"rays", s.rays},
               {"samples", s.samples},
               {"visited", s.visited},
+              {"refined", json_of(s.refined)},
               {"path", s.path},
               {"target", s.target},
               {"layout", s.layout},

@@ -98,6 +98,7 @@ Rendering render(const Plan& plan, const RenderOptions& options) {
     statistics.bytes = fast ? fast->bytes() : 0;
     for (const TileStatistics& t : per_tile) {
         statistics.rays += t.rays, statistics.samples += t.samples, statistics.visited += t.visited;
+        statistics.refined.add(t.refined);
         if (t.wires)
             for (std::size_t w = 0; w < t.wires->size(); ++w) statistics.wires[w].merge((*t.wires)[w]);
     }

@@ -3,6 +3,7 @@
 
 #include "core/image.h"
 #include "pipeline/plan/plan.h"
+#include "pipeline/refined.h"
 
 #include <array>
 #include <atomic>
@@ -33,9 +34,10 @@ struct RenderStatistics {
     int threads = 1;
     std::int64_t rays = 0, samples = 0;  // rays that meet the volume; slabs composited
     std::int64_t visited = 0;            // slabs that went through the stages and were not skipped as empty
-    double seconds = 0;                  // of ray casting alone
-    double setup_seconds = 0;            // of layouts and blocks that were built for this picture
-    std::int64_t bytes = 0;              // volume layouts, tables and buffers
+    RefinedSlabs refined;
+    double seconds = 0;                        // of ray casting alone
+    double setup_seconds = 0;                  // of layouts and blocks that were built for this picture
+    std::int64_t bytes = 0;                    // volume layouts, tables and buffers
     std::array<WireStatistics, kWires> wires;  // with audit
 };
 

@@ -48,6 +48,14 @@ struct FromVolume {
     Neighbourhood<W> neighbourhood(const std::array<W, 3>& at) const {
         return {cube<W, 4>(at, 1)};
     }
+    /// One where a cell holds a wall, else zero.
+    template <class W>
+    W nears_wall(const WallStage& walls, const std::array<W, 3>& at) const {
+        const Cell<std::int64_t> corners =
+            cell(std::array<std::int64_t, 3>{to_index(at[0]), to_index(at[1]), to_index(at[2])});
+        const auto [least, greatest] = std::minmax_element(corners.corner.begin(), corners.corner.end());
+        return constant<W>(walls.between(*least, *greatest) ? 1 : 0);
+    }
 
   private:
     // N^3 voxels, from `before` voxels below a cell on, x fastest.
@@ -158,11 +166,38 @@ class Slabs {
     void composite_slab(Sample<W>& front, Sample<W>& back, W length) {
         observer_.at(Part::classification);
         Slab<W> slab = classify(method_, front.input, back.input, length);
-        if (plan_.lit && any(constant<W>(0) < slab.alpha)) light(front, back, length, slab);
+        const W zero = constant<W>(0),
+                twice = plan_.walls.looks_twice ? wants_second_look(front, back, slab) : zero;
+        const Slab<W> looked = any(zero < twice) ? look_twice(front, back, length) : slab;
+        if (plan_.lit && any((zero < slab.alpha) & (twice == zero))) light(front, back, length, slab);
+        for (std::size_t c = 0; c < 3; ++c)
+            slab.color[c] = select(zero < twice, looked.color[c], slab.color[c]);
+        slab.alpha = select(zero < twice, looked.alpha, slab.alpha);
         observer_.at(Part::compositing);
         const Accumulated<W> before = pixel;
         composite(plan_.compositing, pixel, slab.color, slab.alpha);
         observer_.composited(slab, before, pixel);
+    }
+
+    // One where a slab that met no wall has one in a cell on its way: at its ends, or half-way.
+    W wants_second_look(const Sample<W>& front, const Sample<W>& back, const Slab<W>& slab) const {
+        const W zero = constant<W>(0);
+        const auto open = slab.alpha < constant<W>(plan_.inside.one_alpha);
+        if (!any(open)) return zero;
+        const auto near = [&](const CellPosition<W>& p) { return voxels_.nears_wall(plan_.walls, p.cell); };
+        W wall = max(near(front.position), near(back.position));
+        if (any(wall == zero)) {
+            observer_.at(Part::location);
+            wall = max(
+                wall, near(position_of(location_between(plan_.inside, front.location, back.location, 1, 1))));
+        }
+        return select(open, wall, zero);
+    }
+    // Stages 1 to 5 once more: a slab in pieces between samples inside it, joined.
+    Slab<W> look_twice(const Sample<W>& front, const Sample<W>& back, W length) const {
+        observer_.looked_twice();
+        return slab_in_pieces(front, back, length, kSecondLookBits,
+                              [&](int i) { return sample_between(front, back, i, kSecondLookBits).input; });
     }
 
     // Stages 3 and 5: lights what is visible of a slab, with one normal or in pieces, as shading.inside says.
@@ -188,8 +223,12 @@ class Slabs {
         for (int bits = 1; bits <= kMostCuts; ++bits) {
             const auto so_many = cuts == constant<W>(bits);
             if (!any(so_many)) continue;
-            const std::array<W, 3> color = light_in_pieces(front, back, length, bits);
-            for (std::size_t c = 0; c < 3; ++c) slab.color[c] = select(so_many, color[c], slab.color[c]);
+            observer_.cut(bits);
+            const Slab<W> joined = slab_in_pieces(front, back, length, bits, [&](int i) {
+                return input_between(inside, front.input, back.input, i, bits);
+            });
+            for (std::size_t c = 0; c < 3; ++c)
+                slab.color[c] = select(so_many, joined.color[c], slab.color[c]);
         }
     }
 
@@ -215,9 +254,10 @@ class Slabs {
         shade_fading(plan_.shading, ray_, normal, certain, light, slab.color);
     }
 
-    // The straight colour of a slab from 2^bits lit pieces.
-    std::array<W, 3> light_in_pieces(const Sample<W>& front, const Sample<W>& back, W length,
-                                     int bits) const {
+    // A slab from 2^bits pieces, lit if light falls on it; input_at(i): between pieces i - 1 and i.
+    template <class InputAt>
+    Slab<W> slab_in_pieces(const Sample<W>& front, const Sample<W>& back, W length, int bits,
+                           const InputAt& input_at) const {
         const InsideStage& inside = plan_.inside;
         PieceLight<W> sum = no_piece<W>(inside);
         W near = front.input, near_length = constant<W>(0);
@@ -225,19 +265,22 @@ class Slabs {
         for (int i = 1; i <= 1 << bits; ++i) {
             observer_.at(Part::classification);
             const bool last = i == 1 << bits;
-            const W far = last ? back.input : input_between(inside, front.input, back.input, i, bits);
+            const W far = last ? back.input : input_at(i);
+            observer_.at(Part::classification);
             const W far_length = last ? length : length_up_to(inside, length, i, bits);
             Slab<W> piece = classify(method_, near, far, far_length - near_length);
             if (any(constant<W>(0) < piece.alpha)) {
-                light_with(for_pieces(plan_.gradient, gradient_between(front, back, 2 * i - 1, bits + 1)),
-                           piece, !seen);
+                if (plan_.lit)
+                    light_with(for_pieces(inside, plan_.gradient,
+                                          gradient_between(front, back, 2 * i - 1, bits + 1)),
+                               piece, !seen);
                 seen = true;
                 add_piece(inside, sum, piece.color, piece.alpha);
             }
             near = far, near_length = far_length;
         }
-        observer_.at(Part::shading);
-        return color_of_pieces(inside, sum);
+        observer_.at(plan_.lit ? Part::shading : Part::classification);
+        return {color_of_pieces(inside, sum), opacity_of_pieces(inside, sum)};
     }
 
     // Lights a slab or a piece of one by one raw gradient; a slab's normal is that of its first piece.
@@ -263,6 +306,11 @@ class Slabs {
         sample.location = location_between(plan_.inside, front.location, back.location, part, bits);
         sample.position = position_of(sample.location);
         return gradient_at(sample);
+    }
+    // Stages 1 and 2 there.
+    Sample<W> sample_between(const Sample<W>& front, const Sample<W>& back, int part, int bits) const {
+        observer_.at(Part::location);
+        return sample_at(location_between(plan_.inside, front.location, back.location, part, bits));
     }
 
     // Stage 2 at a location.

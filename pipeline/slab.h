@@ -1,6 +1,7 @@
 // What the composition (slab-inl.h) passes on and reports: samples, pixels, parts and observers.
 #pragma once
 
+#include "pipeline/refined.h"
 #include "pipeline/stages/compositing.h"
 #include "pipeline/stages/location.h"
 
@@ -52,6 +53,7 @@ struct Pixel {
     std::optional<double> first_hit;  // distance from the ray's origin to the first visible slab, world units
     double weighted_distance = 0, weight = 0;  // sum of w z and of w
     std::array<W, 3> first_normal{};
+    RefinedSlabs refined;
 };
 
 /// Observes nothing.  Every observer of the composition has these members, and changes no word.
@@ -60,6 +62,10 @@ struct Silent {
     static constexpr void at(Part) {}
     /// Slab k begins.
     static constexpr void slab(const auto& /*k*/) {}
+    /// A slab is looked at twice.
+    static constexpr void looked_twice() {}
+    /// A visible slab is lit in 2^bits pieces.
+    static constexpr void cut(int /*bits*/) {}
     /// A visible slab is about to be lit with this normal.
     static constexpr void lit(const auto& /*normal*/) {}
     /// A slab, lit if light falls on it, was composited: the pixel before and after.

@@ -24,6 +24,7 @@ enum class LerpRule { one_product, two_products };  // Squeeze, equations 14 and
 enum class GradientRule { central, central_samples, analytic, sobel };
 enum class Method { pc, pc_mid, pi2d, pi2d_no_attenuation, pi1d, pi1d_engel, pips, leg };
 enum class TableLookup { bilinear, nearest };
+enum class WallRule { twice, ends, none };  // where opaque values inside a slab are looked for
 enum class AlphaEncoding { alpha, sqrt_alpha, transparency };  // what of an opacity table_alpha stores
 enum class ShadingModel { none, phong, blinn_phong, cone, gooch };
 enum class ConeSlope { energy, paper };
@@ -66,6 +67,7 @@ SQUINT_NAMES(LerpRule, "one_product", "two_products");
 SQUINT_NAMES(GradientRule, "central", "central_samples", "analytic", "sobel");
 SQUINT_NAMES(Method, "pc", "pc_mid", "pi2d", "pi2d_no_attenuation", "pi1d", "pi1d_engel", "pips", "leg");
 SQUINT_NAMES(TableLookup, "bilinear", "nearest");
+SQUINT_NAMES(WallRule, "twice", "ends", "none");
 SQUINT_NAMES(AlphaEncoding, "alpha", "sqrt_alpha", "transparency");
 SQUINT_NAMES(ShadingModel, "none", "phong", "blinn_phong", "cone", "gooch");
 SQUINT_NAMES(ConeSlope, "energy", "paper");
@@ -147,8 +149,8 @@ struct ClassificationSettings {
     int table_size = 256;      // pi2d: nodes a side
     TableLookup lookup = TableLookup::bilinear;
     AlphaEncoding encoding = AlphaEncoding::alpha;
-    bool opaque_prediction = true;  // experiments only: without it thin opaque surfaces are lost
-    bool as_printed = false;        // for experiments only: pips with the errors of the paper
+    WallRule opaque_prediction = WallRule::twice;  // none: for experiments, thin opaque surfaces are lost
+    bool as_printed = false;                       // for experiments only: pips with the errors of the paper
 
     /// The order; where none is given, the least that the method has.
     int order_or_least() const { return order.value_or(method == Method::leg ? 2 : 1); }
@@ -300,8 +302,10 @@ void visit_scene(S& scene, V&& visit) {
     visit(
         "classification.encoding", classification.encoding,
         "what of an opacity is stored in table_alpha's format: alpha, sqrt_alpha or transparency, 1 - alpha");
-    visit("classification.opaque_prediction", classification.opaque_prediction,
-          "find opaque values inside a slab");
+    visit(
+        "classification.opaque_prediction", classification.opaque_prediction,
+        "where opaque values inside a slab are looked for: ends (between the values at its ends), twice (at "
+        "three samples inside, too, where a cell on its way has both sides of one) or none");
     visit("classification.as_printed", classification.as_printed,
           "pips as Lee & Shin print it: sums by rectangles, the series at every depth, poles and all, opaque "
           "prediction one way only");

@@ -113,7 +113,7 @@ PrefixLookup build_prefix_lookup(const ClassificationInputs& in, int sub_entry_b
     p.to_shorter = p.entries.to_shorter;
     p.to_wall = Rescale(p.entries.color_fraction + p.entries.alpha_fraction, in.specs[Wire::slab_ratio],
                         static_cast<int>(Wire::slab_ratio));
-    p.predicts = p.entries.has_opaque && in.settings.opaque_prediction;
+    p.predicts = p.entries.has_opaque && in.settings.opaque_prediction != WallRule::none;
     if (p.predicts) {
         const preintegration::OpaquePrediction prediction = preintegration::predict_opaque(in.entries);
         p.walls = Table(n, 2);
@@ -126,9 +126,9 @@ PrefixLookup build_prefix_lookup(const ClassificationInputs& in, int sub_entry_b
 }
 
 std::shared_ptr<const preintegration::ExactSeries> exact_series_of(const ClassificationInputs& in) {
-    preintegration::ExactSeries series =
-        preintegration::build_exact_series(in.entries, in.settings.order_or_least(),
-                                           in.settings.method == Method::leg, in.settings.opaque_prediction);
+    preintegration::ExactSeries series = preintegration::build_exact_series(
+        in.entries, in.settings.order_or_least(), in.settings.method == Method::leg,
+        in.settings.opaque_prediction != WallRule::none);
     series.step = in.step_world;
     return std::make_shared<const preintegration::ExactSeries>(std::move(series));
 }

@@ -114,6 +114,8 @@ struct BoundedVolume {
     BoundedCell cell(const std::array<Bounded, 3>& at) const;
     template <class W>
     auto neighbourhood(const std::array<W, 3>& at) const;
+    template <class W>
+    W nears_wall(const WallStage& walls, const std::array<W, 3>& at) const;
 };
 
 }  // namespace
@@ -217,6 +219,11 @@ auto BoundedVolume::neighbourhood(const std::array<W, 3>&) const {
     Neighbourhood<W> none;
     none.voxel.fill(unbounded(0));
     return none;
+}
+// Nor are slabs looked at twice.
+template <class W>
+W BoundedVolume::nears_wall(const WallStage&, const std::array<W, 3>&) const {
+    return unbounded(0);
 }
 
 struct Interval {
@@ -827,8 +834,11 @@ std::optional<std::string> what_is_not_bounded(const Plan& plan) {
             "classification.method {}{} is not bounded yet; allowed: pc, pc_mid, pips of order 1",
             name_of(plan.scene.classification.method),
             plan.scene.classification.method == Method::pips ? " of this order" : "");
-    if (is_series && plan.entries.any_opaque() && !plan.scene.classification.opaque_prediction)
-        return "opaque entries without classification.opaque_prediction are not bounded yet; allowed: true";
+    const WallRule walls = plan.scene.classification.opaque_prediction;
+    if (plan.walls.looks_twice || (is_series && plan.entries.any_opaque() && walls == WallRule::none))
+        return fmt::format(
+            "opaque entries with classification.opaque_prediction {} are not bounded yet; allowed: ends",
+            name_of(walls));
     if (plan.lit) return "light is not bounded yet; allowed: shading.model none, or no lights";
     if (plan.interpolation.nearest)
         return "sampling.interpolation nearest jumps from voxel to voxel; allowed: trilinear";
@@ -864,7 +874,7 @@ Certificate certify(const Plan& plan, const CertificateOptions& options) {
     } else {
         const auto& series = std::get<PowerSeriesOfOrder1>(plan.method);
         preintegration::ExactSeries exact = preintegration::build_exact_series(
-            plan.entries, 1, false, plan.scene.classification.opaque_prediction);
+            plan.entries, 1, false, plan.scene.classification.opaque_prediction != WallRule::none);
         exact.step = full_step(plan);
         certify_all(BoundedPowerSeries{series, function, exact});
     }

@@ -4,6 +4,7 @@
 
 #include "core/image.h"
 #include "pipeline/plan/plan.h"
+#include "pipeline/refined.h"
 
 #include <array>
 #include <memory>
@@ -12,7 +13,8 @@
 namespace squint {
 
 struct TileStatistics {
-    std::int64_t rays = 0, samples = 0, visited = 0;            // as RenderStatistics
+    std::int64_t rays = 0, samples = 0, visited = 0;  // as RenderStatistics
+    RefinedSlabs refined;
     std::unique_ptr<std::array<WireStatistics, kWires>> wires;  // with audit
 };
 

@@ -47,6 +47,9 @@ struct AnyVoxel {
         near.voxel.fill(voxel);
         return near;
     }
+    W nears_wall(const WallStage&, const std::array<W, 3>&) const {
+        return any_word(WordTag<W>{}, Range{0, 1}, 1);
+    }
 };
 
 /// One slab, onto any pixel; of a projection, any sample and the ray's end.  The first slab of a ray computes

@@ -175,6 +175,13 @@ InsideRule inside_rule(Plan& plan) {
     return asked.value_or(InsideRule::mean);
 }
 
+// Slabs of methods that know walls; as printed, one way is enough.
+bool looks_twice(const Plan& plan) {
+    const ClassificationSettings& c = plan.scene.classification;
+    return plan.needs_back && c.opaque_prediction == WallRule::twice && !c.as_printed &&
+           plan.entries.any_opaque();
+}
+
 // ----------------------------------------------------------------------- what is left out, and why
 
 // A transparent sample changes nothing, so empty space can be skipped.
@@ -291,6 +298,7 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
     in.premultiplied = std::visit([](const auto& m) { return m.kPremultiplied; }, plan.method);
     in.inside = inside_rule(plan);
     plan.inside = build_inside(in, plan.location);
+    if (looks_twice(plan)) plan.walls = build_walls(plan.entries, std::int64_t{v.largest} + 1);
     plan.gradient = build_gradient(in);
     plan.shading = build_shading(in);
     report_shading(plan);
@@ -336,7 +344,7 @@ void set_active(Plan& plan, const std::array<bool, kWires>& rounded) {
     plan.input.active = is(Wire::classification_input);
     plan.gradient.active = is(Wire::spacing);
     plan.shading.active = is(Wire::material);
-    plan.inside.to_whole.active = is(Wire::lit_color);
+    plan.inside.to_whole.active = is(plan.inside.color_wire);
     plan.real = true;
 }
 

@@ -13,6 +13,7 @@
 #include "pipeline/stages/interpolation.h"
 #include "pipeline/stages/location.h"
 #include "pipeline/stages/shading.h"
+#include "pipeline/stages/walls.h"
 #include "scene/scene.h"
 
 #include <cstdint>
@@ -54,6 +55,7 @@ struct Plan {
     ClassificationMethod method;
     ShadingStage shading;
     InsideStage inside;
+    WallStage walls;
     CompositingStage compositing;
     bool lit = false;
     bool projection_mode = false;  // mip, minip, average
@@ -85,8 +87,9 @@ struct Plan {
     bool samples_both_ends() const { return needs_back || projection_mode; }
     /// Whether light comes by the gradients at slabs' ends, which neighbours share.
     bool shares_ends() const { return lit && lights_by_ends(inside.rule); }
-    /// Whether stage 3 needs samples' locations, not only their cells.
-    bool keeps_locations() const { return gradient_from_samples() || (lit && inside.samples_between()); }
+    /// Whether places between samples, or one voxel beside them, are computed: from locations, not only cells.
+    bool keeps_locations() const { return walls.looks_twice || lights_by_locations(); }
+    bool lights_by_locations() const { return gradient_from_samples() || (lit && inside.samples_between()); }
     bool gradient_from_samples() const { return lit && gradient.rule == GradientRule::central_samples; }
     Spec spec(Wire wire) const { return specs[wire]; }
 };

@@ -84,7 +84,8 @@ void for_slabs(const Plan& plan, const F& f) {
             inside = sum, from = end;
             if (end == high) break;
             // A slab ends at a wall that it comes to.
-            if (plan.scene.classification.opaque_prediction && entry[static_cast<std::size_t>(end)].opaque)
+            if (plan.scene.classification.opaque_prediction != WallRule::none &&
+                entry[static_cast<std::size_t>(end)].opaque)
                 break;
         }
     }

@@ -84,10 +84,11 @@ template <class W>
 HWY_INLINE std::array<W, 3> sum_of_ends(const std::array<W, 3>& front, const std::array<W, 3>& back) {
     return {front[0] + back[0], front[1] + back[1], front[2] + back[2]};
 }
-/// A piece's gradient beside such sums: twice as long where lengths matter.
+/// A piece's gradient: twice as long beside such sums, where lengths matter.
 template <class W>
-HWY_INLINE std::array<W, 3> for_pieces(const GradientStage& s, const std::array<W, 3>& gradient) {
-    return s.fades ? sum_of_ends(gradient, gradient) : gradient;
+HWY_INLINE std::array<W, 3> for_pieces(const InsideStage& s, const GradientStage& g,
+                                       const std::array<W, 3>& gradient) {
+    return doubles_pieces(s, g) ? sum_of_ends(gradient, gradient) : gradient;
 }
 
 /// The gradient part of the way from a slab's front to its back.
@@ -115,7 +116,7 @@ HWY_INLINE void share_normal(std::array<W, 3>& front, std::array<W, 3>& back) {
     }
 }
 
-/// The light of a slab's pieces, front to back, joined to one straight colour.
+/// The light of a slab's pieces, front to back, joined to one colour.
 template <class W>
 struct PieceLight {
     std::array<W, 3> light;
@@ -126,21 +127,33 @@ HWY_INLINE PieceLight<W> no_piece(const InsideStage& s) {
     const W zero = constant<W>(0);
     return {{zero, zero, zero}, constant<W>(s.one_alpha)};
 }
-/// Adds a lit piece of straight colour.
+/// Adds a piece.
 template <class W>
 HWY_INLINE void add_piece(const InsideStage& s, PieceLight<W>& sum, const std::array<W, 3>& color, W alpha) {
     const W part = min(quantise(sum.through * alpha, s.to_part), sum.through);
+    const W weight = s.premultiplied ? sum.through : part;
     for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
-        sum.light[c] = affine(sum.light[c], part, color[c], 0, s.one_alpha * s.largest_lit);
+        sum.light[c] = affine(sum.light[c], weight, color[c], 0, s.most_light);
     });
     sum.through = within(sum.through - part, 0, s.one_alpha);
 }
 template <class W>
+HWY_INLINE W opacity_of_pieces(const InsideStage& s, const PieceLight<W>& sum) {
+    return constant<W>(s.one_alpha) - sum.through;
+}
+template <class W>
 HWY_INLINE std::array<W, 3> color_of_pieces(const InsideStage& s, const PieceLight<W>& sum) {
-    const W seen = max(constant<W>(s.one_alpha) - sum.through, constant<W>(1));
+    const W opacity = opacity_of_pieces(s, sum), seen = max(opacity, constant<W>(1));
+    const W largest = constant<W>(s.largest_color);
+    // What is not lit is no brighter than opaque.
+    const W limit = s.lit || !s.premultiplied ? largest
+                    : s.finer >= 0            ? min(shift_left(opacity, s.finer), largest)
+                                              : floor_shift(opacity, -s.finer);
     std::array<W, 3> color;
     for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
-        color[c] = min(divide(sum.light[c], seen, s.to_whole), constant<W>(s.largest_lit));
+        color[c] =
+            min(s.premultiplied ? quantise(sum.light[c], s.to_whole) : divide(sum.light[c], seen, s.to_whole),
+                limit);
     });
     return color;
 }

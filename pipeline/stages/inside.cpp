@@ -1,6 +1,7 @@
 #include "pipeline/stages/inside.h"
 
 #include "pipeline/classification/entries.h"
+#include "pipeline/stages/gradient.h"
 #include "pipeline/stages/inputs.h"
 #include "pipeline/stages/location.h"
 
@@ -18,6 +19,10 @@ Rescale to_way(const StageInputs& in, Wire wire, int bits) {
 }
 
 }  // namespace
+
+bool doubles_pieces(const InsideStage& inside, const GradientStage& gradient) {
+    return gradient.fades && lights_by_ends(inside.rule);
+}
 
 InsideStage build_inside(const StageInputs& in, const LocationStage& location) {
     InsideStage s;
@@ -39,13 +44,19 @@ InsideStage build_inside(const StageInputs& in, const LocationStage& location) {
     s.highest_input = static_cast<std::int64_t>(in.entries.size() - 1)
                       << fraction(in, Wire::classification_input);
     s.one_alpha = in.specs[Wire::slab_alpha].format.one();
-    s.largest_lit = in.specs[Wire::lit_color].format.largest();
+    s.lit = in.lit, s.premultiplied = in.premultiplied;
+    s.color_wire = in.lit ? Wire::lit_color : in.premultiplied ? Wire::slab_color : Wire::slab_ratio;
+    s.finer = fraction(in, s.color_wire) - fraction(in, Wire::slab_alpha);
+    s.largest_color = in.specs[s.color_wire].format.largest();
+    // Premultiplied colours that are lit may exceed their opacities: pieces then sum to as many times more.
+    s.most_light = (in.premultiplied ? std::int64_t{1} << kMostCuts : 1) * s.one_alpha * s.largest_color;
     s.least_cut = std::max<std::int64_t>(s.one_alpha >> 10, 32);
     s.to_end = to_way(in, Wire::gradient, kWayBits);
     s.to_part = rescale(in, 2 * fraction(in, Wire::slab_alpha), Wire::slab_alpha);
     // Belongs to no wire: intervals cannot see that a mean of lit colours needs no limit.
-    s.to_whole = Rescale(fraction(in, Wire::lit_color), in.specs[Wire::lit_color]);
-    s.to_whole.divides = true;
+    const int gained = in.premultiplied ? fraction(in, Wire::slab_alpha) : 0;
+    s.to_whole = Rescale(fraction(in, s.color_wire) + gained, in.specs[s.color_wire]);
+    s.to_whole.divides = !in.premultiplied;
     return s;
 }
 

@@ -12,6 +12,7 @@
 
 #include "fixedpoint/words.h"
 #include "scene/scene.h"
+#include "scene/wires.h"
 
 #include <array>
 #include <cstdint>
@@ -39,10 +40,15 @@ struct InsideStage {
     std::array<std::int64_t, 3> limit{};       // the last voxel centre
     std::int64_t highest_input = 0;
     std::int64_t least_cut = 0;  // slabs of less opacity are not cut: 2^-10, or 32 last bits
-    std::int64_t one_alpha = 0, largest_lit = 0;
+    std::int64_t one_alpha = 0;
+    // Joining pieces: colours come in this wire's format, straight or premultiplied.
+    Wire color_wire = Wire::lit_color;
+    bool lit = false, premultiplied = false;
+    int finer = 0;  // fraction bits of a colour above an opacity's
+    std::int64_t largest_color = 0, most_light = 0;
     Rescale to_end;    // a gradient on the way to the back
     Rescale to_part;   // light behind earlier pieces
-    Rescale to_whole;  // light of all pieces over their opacity
+    Rescale to_whole;  // light of all pieces; straight: over their opacity
 
     bool needs_back() const { return rule != InsideRule::front; }
     /// Whether gradients are sampled between a slab's ends.
@@ -56,6 +62,10 @@ struct InsideStage {
         v(to_end), v(to_part), v(to_whole);
     }
 };
+
+/// Whether the gradients of pieces count twice: where light fades in by the sums of gradients at slabs' ends.
+struct GradientStage;
+bool doubles_pieces(const InsideStage& inside, const GradientStage& gradient);
 
 struct LocationStage;
 struct StageInputs;

@@ -50,7 +50,8 @@ StageKernels kernels_for(const Plan& plan, const StageWays& ways, const VoxelSou
     classification_kernel(target, plan, ways.classification, kernels);
     point_kernels(target, plan, ways, kernels);
     shading_kernels(target, plan, ways, kernels);
-    inside_kernels(target, ways, kernels);
+    inside_kernels(target, plan, ways, kernels);
+    wall_kernels(target, ways, kernels);
     compositing_kernel(target, plan, ways.compositing, kernels);
     projection_kernel(target, plan, kernels);
     return kernels;

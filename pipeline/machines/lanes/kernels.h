@@ -5,6 +5,7 @@
 #include "core/image.h"
 #include "pipeline/machines/lanes/cell_blocks.h"
 #include "pipeline/machines/lanes/empty_space.h"
+#include "pipeline/machines/lanes/near_walls.h"
 #include "pipeline/machines/lanes/packet.h"
 #include "pipeline/machines/lanes/schedule.h"
 #include "pipeline/plan/plan.h"
@@ -76,8 +77,15 @@ struct StageKernels {
     int (*pick_by_cuts)(const Plan&, int count, int cuts, const LitSamples&, LitSamples& picked) = nullptr;
     /// Cuts sixteen slabs from `at` on into 2^bits pieces, row i piece i, ready to be classified.
     void (*cut)(const Plan&, const LitSamples& slabs, int at, int bits, Samples&) = nullptr;
-    /// Joins their lit pieces to one colour each.
-    void (*join)(const Plan&, const LitSamples& pieces, int bits, LitSamples& slabs, int at) = nullptr;
+    /// Joins their pieces, lit if light falls on them, to one colour and one opacity each.
+    void (*join)(const Plan&, const Batch (&color)[3], const Batch& alpha, int bits, LitSamples& slabs,
+                 int at) = nullptr;
+    /// Packs those of slabs [0, steps) that are looked at twice for walls, of rays that go on.  Returns their number;
+    /// the last one repeats to a multiple of sixteen.
+    int (*gather_second_looks)(const Plan&, const NearWalls&, const RayPacket&, const PixelPacket&, int steps,
+                               const Samples&, LitSamples& slabs) = nullptr;
+    /// Places of the samples that cut sixteen of them from `at` on into 2^bits: rows [1, 2^bits).
+    void (*place_samples_between)(const Plan&, const LitSamples& slabs, int at, int bits, Samples&) = nullptr;
     /// Loads the voxels around the first `count` packed samples, as many as the gradient rule needs.
     void (*fetch_lit)(const Plan&, const VoxelSource&, int count, LitSamples&) = nullptr;
     /// In place of fetch_lit, for gradients from samples: rows [0, rows) of 16 packed samples each get the
@@ -148,7 +156,8 @@ void voxel_kernels(std::int64_t target, const VoxelSource& source, StageKernels&
 void classification_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);
 void point_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels);
 void shading_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels);
-void inside_kernels(std::int64_t target, const StageWays& ways, StageKernels& kernels);
+void inside_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels);
+void wall_kernels(std::int64_t target, const StageWays& ways, StageKernels& kernels);
 void compositing_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);
 void projection_kernel(std::int64_t target, const Plan& plan, StageKernels& kernels);
 

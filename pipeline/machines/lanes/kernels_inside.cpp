@@ -187,23 +187,25 @@ void find_cuts(const Plan& plan, int count, const lanes::EndGradients& ends, Lit
     }
 }
 
-/// Joins the lit pieces of sixteen slabs, piece i in row i, to straight colours in `slabs` from `at` on.
+/// Joins the pieces of sixteen slabs, piece i in row i, to colours and opacities in `slabs` from `at` on.
 template <class L>
-void join_sixteen(const Plan& plan, const LitSamples& pieces, int bits, LitSamples& slabs, int at) {
+void join_sixteen(const Plan& plan, const lanes::Batch (&color)[3], const lanes::Batch& alpha, int bits,
+                  LitSamples& slabs, int at) {
     for (int r = 0; r < kRays; r += static_cast<int>(L::count())) {
         PieceLight<L> sum = no_piece<L>(plan.inside);
         for (int i = 0; i < 1 << bits; ++i) {
             const int place = i * kRays + r;
-            add_piece(plan.inside, sum, load_three<L>(pieces.color, place), load<L>(pieces.alpha.v + place));
+            add_piece(plan.inside, sum, load_three<L>(color, place), load<L>(alpha.v + place));
         }
-        const std::array<L, 3> color = color_of_pieces(plan.inside, sum);
-        for (std::size_t c = 0; c < 3; ++c) store(color[c], slabs.color[c].v + at + r);
+        const std::array<L, 3> joined = color_of_pieces(plan.inside, sum);
+        for (std::size_t c = 0; c < 3; ++c) store(joined[c], slabs.color[c].v + at + r);
+        store(opacity_of_pieces(plan.inside, sum), slabs.alpha.v + at + r);
     }
 }
 
 }  // namespace
 
-void inside_kernels_of(const lanes::StageWays& ways, lanes::StageKernels& kernels) {
+void inside_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::StageKernels& kernels) {
     constexpr KnownRescales kNothing = KnownRescales::nothing;
     kernels.gather_ends = &gather_slab_ends;
     kernels.add_ends = &add_slab_ends;
@@ -211,10 +213,9 @@ void inside_kernels_of(const lanes::StageWays& ways, lanes::StageKernels& kernel
     lanes::with_word<Lanes, kNothing>(ways.location,
                                       [&]<class L>() { kernels.place_between = &place_between<L>; });
     lanes::with_word<Lanes, kNothing>(ways.classification, [&]<class L>() { kernels.cut = &cut_sixteen<L>; });
-    lanes::with_word<Lanes, kNothing>(ways.shading, [&]<class L>() {
-        kernels.find_cuts = &find_cuts<L>;
-        kernels.join = &join_sixteen<L>;
-    });
+    lanes::with_word<Lanes, kNothing>(ways.shading, [&]<class L>() { kernels.find_cuts = &find_cuts<L>; });
+    lanes::with_word<Lanes, kNothing>(plan.lit ? ways.shading : ways.classification,
+                                      [&]<class L>() { kernels.join = &join_sixteen<L>; });
 }
 
 }  // namespace squint::HWY_NAMESPACE
@@ -222,8 +223,8 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace squint::lanes {
-void inside_kernels(std::int64_t target, const StageWays& ways, StageKernels& kernels) {
-    SQUINT_CALL_TARGET(target, inside_kernels_of, ways, kernels)
+void inside_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels) {
+    SQUINT_CALL_TARGET(target, inside_kernels_of, plan, ways, kernels)
 }
 }  // namespace squint::lanes
 #endif

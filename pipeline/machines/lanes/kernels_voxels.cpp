@@ -107,7 +107,7 @@ int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, int steps
                        lanes::LitSamples& lit) {
     const hn::ScalableTag<Word> d;
     const auto zero = hn::Zero(d);
-    const bool per_ray = plan.shading.needs_ray(), locations = plan.keeps_locations();
+    const bool per_ray = plan.shading.needs_ray(), locations = plan.lights_by_locations();
     const bool adaptive = plan.inside.rule == InsideRule::adaptive, between = plan.inside.samples_between();
     const bool places = between || !plan.shares_ends();
     int count = 0;

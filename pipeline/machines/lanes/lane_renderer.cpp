@@ -210,6 +210,10 @@ LaneRenderer::LaneRenderer(const Plan& plan, const RenderOptions& options)
       ways_(ways_of(plan)),
       count_slabs_(slab_counter(target_)) {
     room_ = room_of(options);
+    if (plan.walls.looks_twice) {
+        walls_ = near_walls(*plan.volume, blocks_met(plan), plan.walls);
+        room_ -= NearWalls::bytes_for(walls_->box);
+    }
     if (options.skip) find_empty();
     choose_layout(options);
     kernels_ = kernels_for(plan, ways_, voxels_, target_);
@@ -290,7 +294,8 @@ std::string LaneRenderer::why() const {
 }
 
 std::int64_t LaneRenderer::bytes() const {
-    return (empty_ ? EmptySpace::bytes_for(empty_->box) : 0) + (cells_ ? cells_->bytes() : 0);
+    return (empty_ ? EmptySpace::bytes_for(empty_->box) : 0) +
+           (walls_ ? NearWalls::bytes_for(walls_->box) : 0) + (cells_ ? cells_->bytes() : 0);
 }
 
 void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& image,
@@ -299,8 +304,9 @@ void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& 
     Workspace& w = *workspace;
     if (plan_.lit) w.lit = {};  // lanes past the last packed sample are computed, too
     if (plan_.shares_ends()) w.ends = {}, w.end_gradients = {};
-    if (plan_.inside.rule == InsideRule::adaptive) w.picked = w.pieces = {}, w.cut = {};
-    PacketLoop loop(plan_, kernels_, schedule_, voxels_, empty_.get(), w);
+    if (plan_.inside.rule == InsideRule::adaptive || walls_) w.picked = w.pieces = {}, w.cut = {};
+    if (walls_) w.twice = {};
+    PacketLoop loop(plan_, kernels_, schedule_, voxels_, empty_.get(), walls_.get(), w);
     const bool colors_alone = !plan_.projection_mode && image.channels.size() == 4;
     for (int y = top; y < bottom; y += kSide)
         for (int x = left; x < right; x += kSide) {
@@ -323,7 +329,7 @@ void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& 
                     plan_.float32 ? store(finished<Real<float>>(w.pixels, r)) : store(loop.pixel(r));
                 }
             statistics.rays += w.rays.rays, statistics.visited += loop.visited();
-            statistics.samples += loop.samples();
+            statistics.samples += loop.samples(), statistics.refined.add(loop.refined());
         }
 }
 

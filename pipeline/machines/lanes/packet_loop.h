@@ -56,6 +56,7 @@ struct Workspace {
     LitSamples ends;  // ends of slabs that are lit by the gradients there
     EndGradients end_gradients;
     LitSamples picked, pieces;  // slabs lit in one number of pieces, and these pieces
+    LitSamples twice;           // slabs looked at twice
     Samples cut;
     Samples beside;  // neighbours that a gradient is computed from
     Notes notes;
@@ -73,19 +74,20 @@ Pixel<W> finished(const PixelPacket& pixels, int r, Pixel<W> pixel = {}) {
 class PacketLoop {
   public:
     PacketLoop(const Plan& plan, const StageKernels& kernels, const Schedule& schedule,
-               const VoxelSource& voxels, const EmptySpace* empty, Workspace& w)
+               const VoxelSource& voxels, const EmptySpace* empty, const NearWalls* walls, Workspace& w)
         : plan_(plan),
           kernels_(kernels),
           schedule_(schedule),
           voxels_(voxels),
           empty_(empty),
+          walls_(walls),
           w_(w),
           backwards_(plan.compositing.form == CompositingForm::back_to_front && !plan.projection_mode),
           notes_((plan.wants_depth || plan.scene.output.normals) && !plan.projection_mode) {}
 
     /// Casts all slabs of a packet whose rays are set up.
     void run() {
-        located_ = -1, visited_ = 0;
+        located_ = -1, visited_ = 0, refined_ = {};
         start_pixels();
         if (notes_)
             std::fill_n(w_.notes.pixel, kRays, Pixel<std::int64_t>{}),
@@ -115,6 +117,8 @@ class PacketLoop {
     }
     /// Slabs of all rays of the packet that went through the stages.
     std::int64_t visited() const { return visited_; }
+    /// And of them, those that were refined.
+    const RefinedSlabs& refined() const { return refined_; }
 
   private:
     void start_pixels() {
@@ -228,6 +232,8 @@ class PacketLoop {
                                                   next.samples);
             case Segment::classify:
                 return kernels_.classify(plan_, slabs, s);
+            case Segment::look_twice:
+                return look_twice(slabs);
             case Segment::light:
                 lit_ = light(slabs);
                 return;
@@ -275,6 +281,7 @@ class PacketLoop {
         shade(count, lit);
         put_back(count, lit);
         if (plan_.inside.rule == InsideRule::adaptive) light_as_it_turns(count);
+        if (plan_.walls.looks_twice) put_back_second_looks();
         return count;
     }
 
@@ -309,41 +316,76 @@ class PacketLoop {
         for (int bits = 1; bits <= kMostCuts; ++bits) {
             const int many = kernels_.pick_by_cuts(plan_, count, bits, w_.lit, w_.picked);
             if (many == 0) continue;
-            for (int at = 0; at < many; at += kRays) light_sixteen(at, bits);
+            refined_.cut(bits, many);
+            for (int at = 0; at < many; at += kRays) {
+                kernels_.cut(plan_, w_.picked, at, bits, w_.cut);
+                kernels_.classify(plan_, 1 << bits, w_.cut);
+                light_sixteen(w_.picked, at, bits);
+            }
+            if (notes_) note_pieces(many, w_.picked);
             put_back(many, w_.picked);
         }
     }
-    void light_sixteen(int at, int bits) {
-        kernels_.cut(plan_, w_.picked, at, bits, w_.cut);
-        kernels_.classify(plan_, 1 << bits, w_.cut);
+    // Lights the pieces of sixteen slabs that were cut and classified, and joins them.
+    void light_sixteen(LitSamples& slabs, int at, int bits) {
         const int count = kRays << bits;
         std::copy_n(w_.cut.alpha.v, count, w_.pieces.alpha.v);
         for (int c = 0; c < 3; ++c) std::copy_n(w_.cut.color[c].v, count, w_.pieces.color[c].v);
         for (int to = 0, part = 1; to < count; to += kRays, part += 2) {
-            kernels_.place_between(plan_, w_.picked, at, kRays, part, bits + 1, w_.pieces, to);
+            kernels_.place_between(plan_, slabs, at, kRays, part, bits + 1, w_.pieces, to);
             for (int a = 0; plan_.shading.needs_ray() && a < 3; ++a) {
-                std::copy_n(w_.picked.view[a].v + at, kRays, w_.pieces.view[a].v + to);
+                std::copy_n(slabs.view[a].v + at, kRays, w_.pieces.view[a].v + to);
                 for (int l = 0; l < plan_.shading.lights; ++l)
-                    std::copy_n(w_.picked.half[l][a].v + at, kRays, w_.pieces.half[l][a].v + to);
+                    std::copy_n(slabs.half[l][a].v + at, kRays, w_.pieces.half[l][a].v + to);
             }
         }
         find_gradients(count, w_.pieces);
-        if (plan_.gradient.fades) double_gradients(count, w_.pieces);
+        if (doubles_pieces(plan_.inside, plan_.gradient)) double_gradients(count, w_.pieces);
         shade(count, w_.pieces);
-        kernels_.join(plan_, w_.pieces, bits, w_.picked, at);
-        if (notes_) note_pieces(at, bits);
-    }
-
-    // The normal of a slab is that of its first visible piece.
-    void note_pieces(int at, int bits) {
-        for (int r = 0; r < kRays; ++r) {
+        kernels_.join(plan_, w_.pieces.color, w_.pieces.alpha, bits, slabs, at);
+        // The normal of a slab is that of its first visible piece.
+        for (int r = 0; notes_ && r < kRays; ++r) {
             int piece = 0;
             while (piece + 1 < 1 << bits && w_.pieces.alpha.v[piece * kRays + r] <= 0) ++piece;
-            const int place = w_.picked.from.v[at + r];
-            w_.notes.in_pieces.v[place] = 1;
-            for (int a = 0; a < 3; ++a)
-                w_.notes.normal[a].v[place] = w_.pieces.normal[a].v[piece * kRays + r];
+            for (int a = 0; a < 3; ++a) slabs.normal[a].v[at + r] = w_.pieces.normal[a].v[piece * kRays + r];
         }
+    }
+    void note_pieces(int count, const LitSamples& slabs) {
+        for (int i = 0; i < count; ++i) {
+            const int place = slabs.from.v[i];
+            w_.notes.in_pieces.v[place] = 1;
+            for (int a = 0; a < 3; ++a) w_.notes.normal[a].v[place] = slabs.normal[a].v[i];
+        }
+    }
+
+    // Slabs with a wall in a cell on their way, and none found, are made of pieces between samples inside them,
+    // which are lit by gradients of their own.
+    void look_twice(int steps) {
+        LitSamples& slabs = w_.twice;
+        looked_ = kernels_.gather_second_looks(plan_, *walls_, w_.rays, w_.pixels, steps, here(), slabs);
+        refined_.looked_twice += looked_;
+        constexpr int kBits = kSecondLookBits;
+        for (int at = 0; at < looked_; at += kRays) {
+            Samples& cut = w_.cut;
+            kernels_.cut(plan_, slabs, at, kBits, cut);
+            kernels_.place_samples_between(plan_, slabs, at, kBits, cut);
+            kernels_.prefetch(voxels_, 1, 1 << kBits, cut);
+            kernels_.fetch(voxels_, 1, 1 << kBits, cut);
+            kernels_.interpolate(plan_, 1, 1 << kBits, cut);
+            kernels_.classify(plan_, 1 << kBits, cut);
+            if (plan_.lit)
+                light_sixteen(slabs, at, kBits);
+            else
+                kernels_.join(plan_, cut.color, cut.alpha, kBits, slabs, at);
+        }
+        Samples& s = here();
+        for (int i = 0; i < looked_; ++i) s.alpha.v[slabs.from.v[i]] = slabs.alpha.v[i];
+        put_back(looked_, slabs);
+    }
+    // Their pieces' light, in place of the whole slabs'.
+    void put_back_second_looks() {
+        put_back(looked_, w_.twice);
+        if (notes_) note_pieces(looked_, w_.twice);
     }
 
     // for_pieces of gathered gradients.
@@ -412,14 +454,16 @@ class PacketLoop {
     const Schedule& schedule_;
     const VoxelSource& voxels_;
     const EmptySpace* empty_;
+    const NearWalls* walls_;
     Workspace& w_;
     bool backwards_;
-    bool notes_;   // depth or normals are asked for
-    int lit_ = 0;  // slabs of the batch at hand
+    bool notes_;                // depth or normals are asked for
+    int lit_ = 0, looked_ = 0;  // slabs of the batch at hand: those lit, those looked at twice
     int current_ = 0;
     int located_ = -1;    // first slab of the batch whose locations are in the other buffer
     int last_count_ = 0;  // slabs of the last batch
     std::int64_t visited_ = 0;
+    RefinedSlabs refined_;
 };
 
 }  // namespace squint::lanes

@@ -15,6 +15,7 @@ using enum Segment;
 
 constexpr Part kLocation[] = {Part::location}, kSample[] = {Part::interpolation, Part::input},
                kClassification[] = {Part::classification},
+               kSecondLook[] = {Part::location, Part::interpolation, Part::input, Part::classification},
                kLight[] = {Part::gradient, Part::normal, Part::shading}, kCompositing[] = {Part::compositing},
                kPoint[] = {Part::classification, Part::compositing};
 
@@ -30,6 +31,7 @@ constexpr Row kSegmentRows[] = {
     {fetch, "fetch", {}},
     {interpolate, "interpolate", kSample},
     {classify, "classify", kClassification},
+    {look_twice, "look_twice", kSecondLook},
     {light, "light", kLight},
     {composite, "composite", kCompositing},
     {project, "project", {}},
@@ -48,7 +50,7 @@ static_assert([] {
 
 // A batch's way, in the order of the composition.  What comes before `fetch` is done a batch ahead, for memory
 // is slow.
-constexpr Segment kWay[] = {locate, address, fetch, interpolate, classify, light, composite};
+constexpr Segment kWay[] = {locate, address, fetch, interpolate, classify, look_twice, light, composite};
 constexpr Segment kProjection[] = {locate, address, fetch, interpolate, project};
 
 // Where it is not cut if there is a kernel for both.
@@ -75,6 +77,7 @@ Schedule schedule_of(const Plan& plan, const StageKernels& kernels) {
     const std::span<const Segment> way = plan.projection_mode ? std::span<const Segment>(kProjection) : kWay;
     std::vector<Segment> segments(way.begin(), way.end());
     if (!plan.lit) std::erase(segments, light);
+    if (!plan.walls.looks_twice) std::erase(segments, look_twice);
     for (const Fusion& fusion : kFusions) {
         const std::array pair{fusion.first, fusion.second};
         const auto at = std::search(segments.begin(), segments.end(), pair.begin(), pair.end());

@@ -22,6 +22,7 @@ enum class Segment {
     fetch,        // corners
     interpolate,  // classification inputs
     classify,     // colours and opacities
+    look_twice,   // for walls between samples
     light,        // of what is seen
     composite,    // onto pixels
     project,      // MIP, MinIP, average: inputs onto what stands for a ray

@@ -13,7 +13,7 @@
 
 namespace squint::model {
 
-// Notes depths and the first normal of a ray where a picture asks for them.
+// Notes depths and the first normal of a ray where a picture asks for them, and counts slabs that are refined.
 template <class W>
 class Aovs : public Silent {
   public:
@@ -24,6 +24,8 @@ class Aovs : public Silent {
           backwards_(plan.compositing.form == CompositingForm::back_to_front) {}
 
     void slab(W k) { k_ = k; }
+    void looked_twice() { ++pixel_.refined.looked_twice; }
+    void cut(int bits) { pixel_.refined.cut(bits); }
     void lit(const std::array<W, 3>& normal) {
         if (!met_ || backwards_) pixel_.first_normal = normal;
         met_ = true;
@@ -117,6 +119,7 @@ void cast_tile(const Plan& plan, [[maybe_unused]] const lanes::EmptySpace* empty
                                                    aovs, pixel, clear);
                     store(plan, pixel, column, row, image);
                     statistics.rays += ray.slabs > 0, statistics.samples += pixel.samples;
+                    statistics.refined.add(pixel.refined);
                 }
         },
         plan.method);

@@ -82,7 +82,7 @@ inline Classifier make_classifier(const Entries& entries, MethodCase which, cons
     preset_specs(preset, in, c.specs);
     c.settings.method = which.method, c.settings.order = which.order;
     c.settings.table_size = table_size > 0 ? table_size : std::max(64, entries.size());
-    c.settings.opaque_prediction = prediction;
+    c.settings.opaque_prediction = prediction ? WallRule::ends : WallRule::none;
     const auto fraction = [&](Wire w) { return c.specs[w].format.fraction_bits; };
     c.input_fraction = fraction(Wire::classification_input);
     c.method = build_method({c.entries, c.specs, c.settings, step, c.input_fraction});

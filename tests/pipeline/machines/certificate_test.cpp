@@ -82,6 +82,7 @@ Case draw_case(unsigned seed) {
     scene.classification = {};
     scene.classification.method = draw.one_of({Method::pc, Method::pc_mid, Method::pips});
     scene.classification.order = 1;
+    scene.classification.opaque_prediction = WallRule::ends;  // second looks are not bounded yet
     if (draw.once_in(5)) scene.classification.encoding = AlphaEncoding::sqrt_alpha;
     scene.compositing.form = draw.any_of<CompositingForm>();
     if (draw.once_in(6)) scene.compositing.mode = draw.any_of<CompositingMode>();

@@ -506,7 +506,7 @@ class KernelChecker {
             if (auto text = differs("alpha", count, samples_->alpha.v[i], lit_->alpha.v[count]);
                 !text.empty())
                 return text;
-            for (int a = 0; a < 3 && !plan_.keeps_locations() && !plan_.shares_ends(); ++a)
+            for (int a = 0; a < 3 && !plan_.lights_by_locations() && !plan_.shares_ends(); ++a)
                 if (auto text = differs("cell", count, samples_->cell[a].v[i], lit_->cell[a].v[count]);
                     !text.empty())
                     return text;

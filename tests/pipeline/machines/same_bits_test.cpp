@@ -103,8 +103,9 @@ void draw_light(Draw& draw, Scene& scene) {
                                  ShadingModel::cone, ShadingModel::gooch});
     shading.cone_slope = draw.any_of<ConeSlope>(), shading.cool_side = draw.any_of<CoolSide>();
     shading.cool = draw.vector(0, 1), shading.warm = draw.vector(0, 1);
-    shading.gradient = draw.one_of({GradientRule::central, GradientRule::sobel, GradientRule::analytic,
-                                    GradientRule::central, GradientRule::central_samples});
+    shading.gradient =
+        draw.one_of({GradientRule::central, GradientRule::sobel, GradientRule::analytic,
+                     GradientRule::central, GradientRule::central_samples, GradientRule::cubic_spline});
     shading.ka = draw.real(0, 1), shading.kd = draw.real(0, 1), shading.ks = draw.real(0, 1);
     shading.power = draw.any_of<PowerRule>();
     shading.exponent = shading.power == PowerRule::squaring
@@ -196,7 +197,8 @@ Case draw_case(unsigned seed, const std::string& preset) {
     method.order = static_cast<int>(method.method == Method::leg ? draw.between(2, 4) : draw.between(1, 5));
     method.table_size = 64;
     method.lookup = draw.any_of<TableLookup>();
-    method.opaque_prediction = !draw.once_in(8);
+    method.opaque_prediction =
+        draw.one_of({WallRule::twice, WallRule::twice, WallRule::ends, WallRule::none});
     if (draw.once_in(5)) method.encoding = draw.any_of<AlphaEncoding>();
     method.as_printed = draw.once_in(5);
     if (draw.once_in(6)) scene.compositing.mode = draw.any_of<CompositingMode>();

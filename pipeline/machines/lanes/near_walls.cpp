@@ -1,0 +1,79 @@
+#include "pipeline/machines/lanes/near_walls.h"
+
+#include "pipeline/machines/lanes/kept.h"
+#include "pipeline/stages/faces.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+
+namespace squint::lanes {
+namespace {
+
+// The bits of the block whose first cell is at (x, y, z).
+template <class T>
+void mark_block(const Volume& volume, const WallStage& walls, const Index3& first, std::uint32_t* bits) {
+    const Index3& n = volume.dims;
+    const T* data = static_cast<const T*>(volume.data.get());
+    constexpr int kVoxels = kBlock + 1;
+    T voxel[kVoxels][kVoxels][kVoxels];
+    for (int z = 0; z < kVoxels; ++z)
+        for (int y = 0; y < kVoxels; ++y) {
+            const T* row = data + n.x * (voxel_at(first.y + y, n.y) + n.y * voxel_at(first.z + z, n.z));
+            for (int x = 0; x < kVoxels; ++x) voxel[z][y][x] = row[voxel_at(first.x + x, n.x)];
+        }
+    for (int z = 0, cell = 0; z < kBlock; ++z)
+        for (int y = 0; y < kBlock; ++y)
+            for (int x = 0; x < kBlock; ++x, ++cell) {
+                T least = voxel[z][y][x], greatest = least;
+                for (int i = 1; i < 8; ++i) {
+                    const T corner = voxel[z + (i >> 2)][y + (i >> 1 & 1)][x + (i & 1)];
+                    least = std::min(least, corner), greatest = std::max(greatest, corner);
+                }
+                if (walls.between(least, greatest)) bits[cell / 32] |= 1U << cell % 32;
+            }
+}
+
+NearWalls find_walls(const Volume& volume, const BlockBox& box, const WallStage& walls) {
+    const std::shared_ptr<const BlockRanges> ranges = block_ranges(volume, box);
+    NearWalls near{box, {}};
+    near.bits.assign(static_cast<std::size_t>(box.count()) * NearWalls::kWords, 0);
+    const Index3 &n = box.blocks, &known = ranges->box.blocks;
+    tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
+        for (std::int64_t y = 0; y < n.y; ++y)
+            for (std::int64_t x = 0; x < n.x; ++x) {
+                const Index3 block = box.low + Index3(x, y, z), there = block - ranges->box.low;
+                const auto in_ranges =
+                    static_cast<std::size_t>((there.z * known.y + there.y) * known.x + there.x);
+                if (!walls.between(ranges->smallest[in_ranges], ranges->largest[in_ranges])) continue;
+                std::uint32_t* bits = near.bits.data() + ((z * n.y + y) * n.x + x) * NearWalls::kWords;
+                const Index3 first(block.x * kBlock, block.y * kBlock, block.z * kBlock);
+                if (volume.type == ScalarType::u8)
+                    mark_block<std::uint8_t>(volume, walls, first, bits);
+                else
+                    mark_block<std::uint16_t>(volume, walls, first, bits);
+            }
+    });
+    return near;
+}
+
+struct Keyed {
+    WallStage walls;
+    NearWalls near;
+};
+
+}  // namespace
+
+std::shared_ptr<const NearWalls> near_walls(const Volume& volume, const BlockBox& box,
+                                            const WallStage& walls) {
+    static KeptPerVolume<Keyed> kept;
+    const std::shared_ptr<Keyed> found = kept.find_or_make(
+        volume,
+        [&] {
+            return std::make_shared<Keyed>(Keyed{walls, find_walls(volume, box, walls)});
+        },
+        [&](const Keyed& k) { return k.walls == walls && k.near.box.holds(box); });
+    return {found, &found->near};
+}
+
+}  // namespace squint::lanes
