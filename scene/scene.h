@@ -21,7 +21,7 @@ namespace squint {
 enum class PositionRule { p0_kv, accumulate };
 enum class InterpolationRule { trilinear, nearest };
 enum class LerpRule { one_product, two_products };  // Squeeze, equations 14 and 15, or 13
-enum class GradientRule { central, central_samples, analytic, sobel };
+enum class GradientRule { central, central_samples, analytic, sobel, cubic_spline };
 enum class Method { pc, pc_mid, pi2d, pi2d_no_attenuation, pi1d, pi1d_engel, pips, leg };
 enum class TableLookup { bilinear, nearest };
 enum class WallRule { twice, ends, none };  // where opaque values inside a slab are looked for
@@ -64,7 +64,7 @@ SQUINT_NAMES(Projection, "orthographic", "perspective");
 SQUINT_NAMES(PositionRule, "p0_kv", "accumulate");
 SQUINT_NAMES(InterpolationRule, "trilinear", "nearest");
 SQUINT_NAMES(LerpRule, "one_product", "two_products");
-SQUINT_NAMES(GradientRule, "central", "central_samples", "analytic", "sobel");
+SQUINT_NAMES(GradientRule, "central", "central_samples", "analytic", "sobel", "cubic_spline");
 SQUINT_NAMES(Method, "pc", "pc_mid", "pi2d", "pi2d_no_attenuation", "pi1d", "pi1d_engel", "pips", "leg");
 SQUINT_NAMES(TableLookup, "bilinear", "nearest");
 SQUINT_NAMES(WallRule, "twice", "ends", "none");
@@ -268,7 +268,8 @@ void visit_scene(S& scene, V&& visit) {
     auto& shading = scene.shading;
     visit("shading.model", shading.model,
           "none, phong, blinn_phong, cone or gooch; absent where there is no light");
-    visit("shading.gradient", shading.gradient, "central, central_samples, analytic or sobel");
+    visit("shading.gradient", shading.gradient,
+          "central, central_samples, analytic, sobel or cubic_spline (of Catmull and Rom)");
     visit("shading.ka", shading.ka, "ambient weight");
     visit("shading.kd", shading.kd, "diffuse weight");
     visit("shading.ks", shading.ks, "specular weight");

@@ -19,6 +19,7 @@ enum class Wire : int {
     sample,
     gradient_lerp,  // stage 3
     gradient,
+    spline,
     spacing,
     normal,
     confidence,
@@ -60,6 +61,7 @@ inline constexpr std::array<WireInfo, kWires> kWireInfo{{
     {"sample", "interpolation", "third lerp level: the interpolated scalar"},
     {"gradient_lerp", "gradient", "first and second lerp level of a gradient"},
     {"gradient", "gradient", "raw gradient, levels per smallest voxel spacing"},
+    {"spline", "gradient", "weights of four voxels, of shading.gradient cubic_spline"},
     {"spacing", "gradient", "smallest voxel spacing over the axis's own"},
     {"normal", "gradient", "normalised gradient"},
     {"confidence", "gradient", "length of a gradient over shading.gradient_floor, 1 at most"},

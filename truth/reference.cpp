@@ -197,12 +197,14 @@ class RayIntegral {
     // The current cell.
     Cubic coordinate_;
     std::array<Cubic, 3> gradient_;
+    SplineGradient spline_;         // in its place where the rule is cubic_spline
     bool smooth_ = true;            // the light on it, but at its corners
     std::vector<double> corner_{};  // where it has some, ascending
     double length_ = 0;
 };
 
 Reflection RayIntegral::reflection_at(double r) const {
+    if (plan_.scene.shading.gradient == GradientRule::cubic_spline) return (*light_)(spline_.at(r));
     return (*light_)(Vec3(gradient_[0].at(r), gradient_[1].at(r), gradient_[2].at(r)));
 }
 
@@ -308,7 +310,11 @@ bool RayIntegral::add_field(const Passage& passage, const Cubic& scalar) {
     for (double& c : coordinate_.c) c /= plan_.entries.scalars_per_entry;
     length_ = passage.length;
     if (light_) {
-        gradient_ = gradient_along(*plan_.volume, plan_.scene.shading.gradient, passage);
+        const ShadingSettings& s = plan_.scene.shading;
+        if (s.gradient == GradientRule::cubic_spline)
+            spline_ = SplineGradient(*plan_.volume, passage);
+        else
+            gradient_ = gradient_along(*plan_.volume, s.gradient, passage);
         find_corners();
     }
     if (matter_.opaque_at(coordinate_.at(0))) {

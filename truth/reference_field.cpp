@@ -109,30 +109,83 @@ Corners corners_of(const Volume& volume, const Index3& cell) {
             v(cell.x, cell.y, z1),     v(x1, cell.y, z1),     v(cell.x, y1, z1),     v(x1, y1, z1)};
 }
 
-std::array<Cubic, 3> gradient_along(const Volume& volume, GradientRule rule, const Passage& passage) {
-    // Differences are the gradient times 1, 2 or 32.
-    const double differences = rule == GradientRule::analytic ? 1 : rule == GradientRule::sobel ? 32 : 2;
+namespace {
+
+/// difference(voxel, axis): what stands at a cell's corner, `times` the gradient.
+template <class F>
+std::array<Cubic, 3> interpolated(const Volume& volume, const Passage& passage, double times,
+                                  const F& difference) {
     std::array<Cubic, 3> gradient;
     for (int axis = 0; axis < 3; ++axis) {
-        const double per_spacing = volume.smallest_spacing() / (volume.spacing[axis] * differences);
-        Corners difference;
-        for (int i = 0; i < 8; ++i) {
-            Index3 p = passage.cell + Index3(i & 1, i >> 1 & 1, i >> 2);
-            double& here = difference[static_cast<std::size_t>(i)];
-            if (rule == GradientRule::analytic) {
+        const double per_spacing = volume.smallest_spacing() / (volume.spacing[axis] * times);
+        Corners corners;
+        for (int i = 0; i < 8; ++i)
+            corners[static_cast<std::size_t>(i)] =
+                difference(passage.cell + Index3(i & 1, i >> 1 & 1, i >> 2), axis) * per_spacing;
+        gradient[static_cast<std::size_t>(axis)] = along(corners, passage);
+    }
+    return gradient;
+}
+
+/// The weights of four points for Hermite's cubic between the middle two, whose slopes are half the differences of
+/// their neighbours; and for its slope.
+struct SplineWeights {
+    std::array<double, 4> value, slope;
+};
+SplineWeights spline_weights(double t) {
+    const auto joined = [](double from, double to, double slope_from, double slope_to) {
+        return std::array<double, 4>{-slope_from / 2, from - slope_to / 2, to + slope_from / 2, slope_to / 2};
+    };
+    const double u = 1 - t;
+    return {joined((1 + 2 * t) * u * u, t * t * (3 - 2 * t), t * u * u, -t * t * u),
+            joined(-6 * t * u, 6 * t * u, u * (1 - 3 * t), t * (3 * t - 2))};
+}
+
+}  // namespace
+
+std::array<Cubic, 3> gradient_along(const Volume& volume, GradientRule rule, const Passage& passage) {
+    switch (rule) {
+        case GradientRule::analytic:
+            return interpolated(volume, passage, 1, [&](Index3 p, int axis) {
                 // The edge through this corner has one value at both its ends.
                 p[axis] = passage.cell[axis];
                 const Index3 ahead = p + unit_along(axis);
-                here = voxel(volume, ahead.x, ahead.y, ahead.z) - voxel(volume, p.x, p.y, p.z);
-            } else {
-                here = rule == GradientRule::sobel ? sobel_difference(volume, p, axis)
-                                                   : central_difference(volume, p, axis);
-            }
-            here *= per_spacing;
-        }
-        gradient[static_cast<std::size_t>(axis)] = along(difference, passage);
+                return voxel(volume, ahead.x, ahead.y, ahead.z) - voxel(volume, p.x, p.y, p.z);
+            });
+        case GradientRule::sobel:
+            return interpolated(volume, passage, 32,
+                                [&](const Index3& p, int axis) { return sobel_difference(volume, p, axis); });
+        default:
+            return interpolated(volume, passage, 2, [&](const Index3& p, int axis) {
+                return central_difference(volume, p, axis);
+            });
     }
-    return gradient;
+}
+
+SplineGradient::SplineGradient(const Volume& volume, const Passage& passage) : passage_(passage) {
+    for (int axis = 0; axis < 3; ++axis)
+        per_spacing_[axis] = volume.smallest_spacing() / volume.spacing[axis];
+    const Index3& cell = passage.cell;
+    for (int i = 0; i < 64; ++i)
+        voxel_[static_cast<std::size_t>(i)] =
+            voxel(volume, cell.x + (i & 3) - 1, cell.y + (i >> 2 & 3) - 1, cell.z + (i >> 4) - 1);
+}
+
+Vec3 SplineGradient::at(double r) const {
+    const Vec3 place = passage_.from + (passage_.to - passage_.from) * r;
+    const std::array<SplineWeights, 3> weights{spline_weights(place.x), spline_weights(place.y),
+                                               spline_weights(place.z)};
+    Vec3 gradient{0, 0, 0};
+    for (std::size_t i = 0; i < 64; ++i) {
+        const std::array<std::size_t, 3> at{i & 3, i >> 2 & 3, i >> 4};
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            double product = voxel_[i];
+            for (std::size_t a = 0; a < 3; ++a)
+                product *= (a == axis ? weights[a].slope : weights[a].value)[at[a]];
+            gradient[static_cast<int>(axis)] += product;
+        }
+    }
+    return gradient * per_spacing_;
 }
 
 Blocks::Blocks(const Volume& volume, const std::function<bool(double, double)>& visible) {

@@ -58,9 +58,23 @@ NearestParts nearest_along(const Corners& corners, const Passage& passage);
 Corners corners_of(const Volume& volume, const Index3& cell);
 
 /// The gradient along a passage, in levels per smallest voxel spacing, in grid space.  The rules of
-/// docs/conventions.md are all trilinear in the cell: differences of samples one voxel apart, clamped to the
+/// docs/conventions.md but cubic_spline are all trilinear in the cell: differences of samples one voxel apart, clamped to the
 /// box, are interpolated differences of voxels.
 std::array<Cubic, 3> gradient_along(const Volume& volume, GradientRule rule, const Passage& passage);
+
+/// The gradient of the spline of Catmull and Rom through the 4x4x4 voxels around a cell: no trilinear field.
+class SplineGradient {
+  public:
+    SplineGradient() = default;
+    SplineGradient(const Volume& volume, const Passage& passage);
+    /// At distance r of the passage.
+    Vec3 at(double r) const;
+
+  private:
+    Passage passage_;
+    Vec3 per_spacing_{1, 1, 1};
+    std::array<double, 64> voxel_{};  // x fastest
+};
 
 /// Blocks of 4 x 4 x 4 cells, and whether a ray must look into each.
 class Blocks {

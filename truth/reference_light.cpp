@@ -38,7 +38,8 @@ RayLight::RayLight(const Scene& scene, const Volume& volume, const Camera& camer
     }
     const ShadingSettings& s = *settings_;
     has_corners_at_its_limits_ = s.model == ShadingModel::blinn_phong && s.power != PowerRule::parabola &&
-                                 lamps_ == 1 && white_ && !(s.gradient_floor > 0) && s.ka + s.kd <= 1;
+                                 lamps_ == 1 && white_ && !(s.gradient_floor > 0) && s.ka + s.kd <= 1 &&
+                                 s.gradient != GradientRule::cubic_spline;
 }
 
 // C = (a kd c + cool) (1 - N.L) / 2 + (b kd c + warm) (1 + N.L) / 2, or with the sides exchanged (Guetat et

@@ -17,7 +17,7 @@ namespace squint {
 
 /// Errors in one unit, by cause: a wire's index, or one of the causes behind the wires.
 struct Shares {
-    static constexpr int kMost = 36, kElsewhere = kMost - 1;
+    static constexpr int kMost = 40, kElsewhere = kMost - 1;
     std::array<double, kMost> of{};
 
     double sum() const {

@@ -89,9 +89,70 @@ HWY_INLINE W analytic_difference(const GradientStage& s, const N& n, const std::
     return lerp(b0, b1, weight[second], bits, s.to_gradient);
 }
 
+/// For the spline of Catmull and Rom through four values in a row, at a place t between the middle two: weights of
+/// their three differences for its slope, and of the values themselves.  Each sums to one exactly, and the weights at
+/// 1 - t are those at t from the other end.
+template <class W>
+HWY_INLINE std::array<W, 3> spline_slope_weights(const GradientStage& s, W t) {
+    const W one = constant<W>(std::int64_t{1} << s.weight_bits);
+    // (1 - t)(1 - 3t) / 2 and t (3t - 2) / 2, with 3F + 1 fraction bits
+    const auto weight = [&](W near, W far) {
+        return quantise(shift_left(far * (far - near - near), s.weight_bits), s.to_spline);
+    };
+    const W rest = one - t, first = weight(t, rest), last = weight(rest, t);
+    return {first, constant<W>(std::int64_t{1} << s.spline_fraction) - (first + last), last};
+}
+template <class W>
+HWY_INLINE std::array<W, 4> spline_weights(const GradientStage& s, W t) {
+    const W one = constant<W>(std::int64_t{1} << s.weight_bits), rest = one - t;
+    const W whole = constant<W>(std::int64_t{1} << s.spline_fraction);
+    // -t (1 - t)^2 / 2 and (1 - t)(1 + (1 - t)(1 + 3t)) / 2, with 3F + 1 fraction bits
+    const auto outer = [&](W near, W far) {
+        return quantise(constant<W>(0) - near * (far * far), s.to_spline);
+    };
+    const auto inner = [&](W near, W far) {
+        return quantise(far * (shift_left(one, s.weight_bits) + far * (one + constant<W>(3) * near)),
+                        s.to_spline);
+    };
+    std::array<W, 4> w{outer(t, rest), inner(t, rest), inner(rest, t), outer(rest, t)};
+    // What roundings leave goes to the nearer.
+    const W left = whole - (w[0] + w[1] + w[2] + w[3]), zero = constant<W>(0);
+    const auto nearer = t < rest;
+    w[1] = w[1] + select(nearer, left, zero), w[2] = w[2] + select(nearer, zero, left);
+    return w;
+}
+
+/// The slope along an axis of the spline through the 4x4x4 voxels around a cell: along that axis first, then across.
+template <class W, class N>
+HWY_INLINE W spline_difference(const GradientStage& s, const N& n, const std::array<W, 3>& weight, int axis) {
+    const auto a = static_cast<std::size_t>(axis), b = (a + 1) % 3, c = (a + 2) % 3;
+    const std::array<W, 3> along = spline_slope_weights(s, weight[a]);
+    const std::array<W, 4> across = spline_weights(s, weight[b]), beyond = spline_weights(s, weight[c]);
+    const auto slope = [&](int j, int k) SQUINT_WRITTEN_OUT {
+        const auto voxel = [&](int i) SQUINT_WRITTEN_OUT {
+            std::array<int, 3> at{};
+            at[a] = i, at[b] = j, at[c] = k;
+            return n.at(at[0], at[1], at[2]);
+        };
+        const W v0 = voxel(0), v1 = voxel(1), v2 = voxel(2), v3 = voxel(3);
+        return quantise(along[0] * (v1 - v0) + along[1] * (v2 - v1) + along[2] * (v3 - v2), s.to_first);
+    };
+    const auto sum = [&](const std::array<W, 4>& w, auto&& at, const Rescale& to) SQUINT_WRITTEN_OUT {
+        return quantise(w[0] * at(0) + w[1] * at(1) + w[2] * at(2) + w[3] * at(3), to);
+    };
+    return sum(
+        beyond,
+        [&](int k) SQUINT_WRITTEN_OUT {
+            return sum(
+                across, [&](int j) SQUINT_WRITTEN_OUT { return slope(j, k); }, s.to_second);
+        },
+        s.to_gradient);
+}
+
 /// A component of the gradient from the voxels around a cell, by the stage's rule.
 template <class W, class N>
 HWY_INLINE W voxel_difference(const GradientStage& s, const N& n, const std::array<W, 3>& weight, int axis) {
+    if (s.rule == GradientRule::cubic_spline) return spline_difference(s, n, weight, axis);
     return s.rule == GradientRule::analytic ? analytic_difference(s, n, weight, axis)
                                             : interpolated_difference(s, n, weight, axis);
 }

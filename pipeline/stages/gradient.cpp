@@ -18,6 +18,8 @@ std::vector<WireFormats> gradient_wires(const PresetInputs& in) {
                wide = signed_spec(scalar, std::min(16, 30 - scalar), kToEven);
     return {{Wire::gradient_lerp, standard, squeeze, eight_bit, wide},
             {Wire::gradient, standard, squeeze, eight_bit, wide},
+            {Wire::spline, signed_spec(1, 15, kToEven), signed_spec(1, 12, trn), signed_spec(1, 8, trn),
+             signed_spec(1, 20, kToEven)},
             {Wire::spacing, unsigned_spec(1, 12, kToEven), unsigned_spec(1, 12, trn),
              unsigned_spec(1, 12, trn), unsigned_spec(1, 20, kToEven)},
             {Wire::normal, signed_spec(1, 15 + sharp, kToEven), signed_spec(1, 12, trn),
@@ -29,6 +31,7 @@ std::vector<WireFormats> gradient_wires(const PresetInputs& in) {
 GradientStage build_gradient(const StageInputs& in) {
     if (in.lit)
         for (const Wire wire : {Wire::gradient_lerp, Wire::gradient, Wire::normal}) require_signed(in, wire);
+    if (in.lit && in.scene.shading.gradient == GradientRule::cubic_spline) require_signed(in, Wire::spline);
     GradientStage s;
     const Volume& v = in.volume;
     s.rule = in.scene.shading.gradient;
@@ -37,12 +40,15 @@ GradientStage build_gradient(const StageInputs& in) {
     // Differences are the gradient times 2 (central), 32 (Sobel) or 1 (analytic): that many fraction bits at
     // first.
     const int first = s.rule == GradientRule::central ? 1 : s.rule == GradientRule::sobel ? 5 : 0;
-    s.to_first = rescale(in, first + s.weight_bits, Wire::gradient_lerp);
-    s.to_second = rescale(in, fraction(in, Wire::gradient_lerp) + s.weight_bits, Wire::gradient_lerp);
+    s.spline_fraction = fraction(in, Wire::spline);
+    s.to_spline = rescale(in, 3 * s.weight_bits + 1, Wire::spline);
+    const int gained = s.rule == GradientRule::cubic_spline ? s.spline_fraction : s.weight_bits;
+    s.to_first = rescale(in, first + gained, Wire::gradient_lerp);
+    s.to_second = rescale(in, fraction(in, Wire::gradient_lerp) + gained, Wire::gradient_lerp);
     s.to_gradient =
         rescale(in,
                 s.rule == GradientRule::central_samples ? s.sample_fraction + 1
-                                                        : fraction(in, Wire::gradient_lerp) + s.weight_bits,
+                                                        : fraction(in, Wire::gradient_lerp) + gained,
                 Wire::gradient);
     s.spacing_fraction = fraction(in, Wire::spacing);
     s.to_scaled = rescale(in, fraction(in, Wire::gradient) + s.spacing_fraction, Wire::gradient);

@@ -42,10 +42,13 @@ struct GradientStage {
     std::int64_t full_length = 0;  // confidence is one from here on, with kNormalGuard fraction bits
     int confidence_fraction = 0;
     Rescale to_confidence;
+    // cubic_spline: weights of four voxels.
+    int spline_fraction = 0;
+    Rescale to_spline;
 
     template <class V>
     void visit(V&& v) {
-        v(to_first), v(to_second), v(to_gradient), v(to_scaled), v(to_normal), v(to_confidence);
+        v(to_first), v(to_second), v(to_gradient), v(to_scaled), v(to_normal), v(to_confidence), v(to_spline);
     }
 };
 /// Builds the stage's constants.  Throws InputError where a wire is unsigned and the scene is lit.
