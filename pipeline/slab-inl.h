@@ -48,6 +48,39 @@ struct FromVolume {
     Neighbourhood<W> neighbourhood(const std::array<W, 3>& at) const {
         return {cube<W, 4>(at, 1)};
     }
+    /// Sums over the 5^3 voxels about each of a neighbourhood's, which stand for those beyond the volume, too.
+    template <class W>
+    Neighbourhood<W> box_sums(const std::array<W, 3>& at) const {
+        constexpr int kReach = kBoxSide / 2, kSide = 4 + 2 * kReach;  // voxels a side that are read
+        const Index3 p(to_index(at[0]), to_index(at[1]), to_index(at[2])), n = volume.dims;
+        std::int64_t sum[kSide][kSide][kSide];
+        for (int z = 0; z < kSide; ++z)
+            for (int y = 0; y < kSide; ++y)
+                for (int x = 0; x < kSide; ++x)
+                    sum[z][y][x] =
+                        volume.at(voxel_at(p.x - 1 - kReach + x, n.x), voxel_at(p.y - 1 - kReach + y, n.y),
+                                  voxel_at(p.z - 1 - kReach + z, n.z));
+        // Axis by axis, in place: place i of four takes those from first(i) on.
+        const auto add = [&](int axis, auto&& line) {
+            std::int64_t four[4];
+            for (int i = 0; i < 4; ++i) {
+                const auto first = voxel_at(p[axis] - 1 + i, n[axis]) - (p[axis] - 1);
+                four[i] = 0;
+                for (int d = 0; d < kBoxSide; ++d) four[i] += line(static_cast<int>(first) + d);
+            }
+            for (int i = 0; i < 4; ++i) line(i) = four[i];
+        };
+        for (int z = 0; z < kSide; ++z)
+            for (int y = 0; y < kSide; ++y) add(0, [&](int i) -> std::int64_t& { return sum[z][y][i]; });
+        for (int z = 0; z < kSide; ++z)
+            for (int x = 0; x < 4; ++x) add(1, [&](int i) -> std::int64_t& { return sum[z][i][x]; });
+        for (int y = 0; y < 4; ++y)
+            for (int x = 0; x < 4; ++x) add(2, [&](int i) -> std::int64_t& { return sum[i][y][x]; });
+        Neighbourhood<W> sums;
+        for (int i = 0; i < 64; ++i)
+            sums.voxel[static_cast<std::size_t>(i)] = constant<W>(sum[i >> 4][i >> 2 & 3][i & 3]);
+        return sums;
+    }
     /// One where a cell holds a wall, else zero.
     template <class W>
     W nears_wall(const WallStage& walls, const std::array<W, 3>& at) const {
@@ -74,6 +107,19 @@ struct FromVolume {
         return voxels;
     }
 };
+
+/// Stage 3: a raw gradient turned from the mean of those about its place.
+template <class W, class Voxels>
+std::array<W, 3> exaggerated_gradient(const Plan& plan, const Voxels& voxels, const std::array<W, 3>& cell,
+                                      const std::array<W, 3>& weight, const std::array<W, 3>& gradient) {
+    const GradientStage& boxes = plan.box_gradient;
+    const Neighbourhood<W> sums = voxels.box_sums(cell);
+    std::array<W, 3> mean;
+    for (int axis = 0; axis < 3; ++axis)
+        mean[static_cast<std::size_t>(axis)] =
+            to_world(boxes, voxel_difference(boxes, sums, weight, axis), axis);
+    return exaggerated(plan.gradient, boxes, gradient, mean);
+}
 
 /// The mean along a ray (trapezoid rule), rounded once: each slab counts its ends' mean, by its length.
 template <class W>
@@ -357,7 +403,9 @@ class Slabs {
             }
             gradient[a] = to_world(s, component, axis);
         }
-        return gradient;
+        if (!s.exaggerated.wanted) return gradient;
+        observer_.at(Part::gradient);
+        return exaggerated_gradient(plan_, voxels_, sample.position.cell, sample.position.weight, gradient);
     }
     W scalar_beside(const Sample<W>& sample, int axis, bool ahead) const {
         observer_.at(Part::location);

@@ -34,6 +34,7 @@ constexpr Limits kLimits[] = {
     {"shading.kd", 0, 1},
     {"shading.ks", 0, 1},
     {"shading.exponent", 1, 4096},
+    {"shading.exaggeration", 0, 7},
     {"shading.gradient_floor", 0, 65536},
     {"shading.cool", 0, 1},
     {"shading.warm", 0, 1},

@@ -135,6 +135,7 @@ struct ShadingSettings {
     double exponent = 32;
     PowerRule power = PowerRule::squaring;
     bool two_sided = false;
+    double exaggeration = 0;                          // of a normal against its surroundings
     double gradient_floor = 0;                        // levels per smallest voxel spacing; 0: no fading
     std::optional<InsideRule> inside = std::nullopt;  // absent: the method's best
     ConeSlope cone_slope = ConeSlope::energy;
@@ -276,6 +277,8 @@ void visit_scene(S& scene, V&& visit) {
     visit("shading.exponent", shading.exponent, "specular exponent; a power of two for squaring");
     visit("shading.power", shading.power, "squaring, parabola or table");
     visit("shading.two_sided", shading.two_sided, "light both sides of a surface");
+    visit("shading.exaggeration", shading.exaggeration,
+          "a normal is turned from the mean about it, of 5^3 voxels: e of N + e (N - N_mean); 0: off");
     visit("shading.gradient_floor", shading.gradient_floor,
           "light counts by the length of the gradient over this, at most 1, in levels per smallest voxel "
           "spacing; 0: always "

@@ -22,6 +22,7 @@ enum class Wire : int {
     spline,
     spacing,
     normal,
+    exaggeration,
     confidence,
     classification_input,  // stage 4
     table_color,
@@ -64,6 +65,7 @@ inline constexpr std::array<WireInfo, kWires> kWireInfo{{
     {"spline", "gradient", "weights of four voxels, of shading.gradient cubic_spline"},
     {"spacing", "gradient", "smallest voxel spacing over the axis's own"},
     {"normal", "gradient", "normalised gradient"},
+    {"exaggeration", "gradient", "shading.exaggeration"},
     {"confidence", "gradient", "length of a gradient over shading.gradient_floor, 1 at most"},
     {"classification_input", "classification", "scalar in table entries"},
     {"table_color", "classification", "colours of the entries"},

@@ -196,16 +196,18 @@ class RayIntegral {
     double clear_ = 1;
     // The current cell.
     Cubic coordinate_;
-    std::array<Cubic, 3> gradient_;
-    SplineGradient spline_;         // in its place where the rule is cubic_spline
-    bool smooth_ = true;            // the light on it, but at its corners
-    std::vector<double> corner_{};  // where it has some, ascending
+    std::array<Cubic, 3> gradient_, mean_gradient_;  // the latter where normals are exaggerated
+    SplineGradient spline_;                          // in place of the former where the rule is cubic_spline
+    bool smooth_ = true;                             // the light on it, but at its corners
+    std::vector<double> corner_{};                   // where it has some, ascending
     double length_ = 0;
 };
 
 Reflection RayIntegral::reflection_at(double r) const {
-    if (plan_.scene.shading.gradient == GradientRule::cubic_spline) return (*light_)(spline_.at(r));
-    return (*light_)(Vec3(gradient_[0].at(r), gradient_[1].at(r), gradient_[2].at(r)));
+    const auto at = [&](const std::array<Cubic, 3>& g) { return Vec3(g[0].at(r), g[1].at(r), g[2].at(r)); };
+    const ShadingSettings& s = plan_.scene.shading;
+    return (*light_)(s.gradient == GradientRule::cubic_spline ? spline_.at(r) : at(gradient_),
+                     at(mean_gradient_));
 }
 
 /// Adds an opaque surface: nothing behind it is seen.
@@ -315,6 +317,7 @@ bool RayIntegral::add_field(const Passage& passage, const Cubic& scalar) {
             spline_ = SplineGradient(*plan_.volume, passage);
         else
             gradient_ = gradient_along(*plan_.volume, s.gradient, passage);
+        if (s.exaggeration > 0) mean_gradient_ = mean_gradient_along(*plan_.volume, passage);
         find_corners();
     }
     if (matter_.opaque_at(coordinate_.at(0))) {

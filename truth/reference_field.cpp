@@ -127,6 +127,19 @@ std::array<Cubic, 3> interpolated(const Volume& volume, const Passage& passage, 
     return gradient;
 }
 
+/// The mean of the 5^3 voxels about one; about one beyond the volume, of its outermost's.
+double box_mean(const Volume& volume, const Index3& p) {
+    const auto inside = [&](std::int64_t i, int axis) {
+        return std::clamp<std::int64_t>(i, 0, volume.dims[axis] - 1);
+    };
+    const Index3 middle(inside(p.x, 0), inside(p.y, 1), inside(p.z, 2));
+    double sum = 0;
+    for (int z = -2; z <= 2; ++z)
+        for (int y = -2; y <= 2; ++y)
+            for (int x = -2; x <= 2; ++x) sum += voxel(volume, middle.x + x, middle.y + y, middle.z + z);
+    return sum / 125;
+}
+
 /// The weights of four points for Hermite's cubic between the middle two, whose slopes are half the differences of
 /// their neighbours; and for its slope.
 struct SplineWeights {
@@ -160,6 +173,13 @@ std::array<Cubic, 3> gradient_along(const Volume& volume, GradientRule rule, con
                 return central_difference(volume, p, axis);
             });
     }
+}
+
+std::array<Cubic, 3> mean_gradient_along(const Volume& volume, const Passage& passage) {
+    return interpolated(volume, passage, 2, [&](const Index3& p, int axis) {
+        const Index3 e = unit_along(axis);
+        return box_mean(volume, p + e) - box_mean(volume, p - e);
+    });
 }
 
 SplineGradient::SplineGradient(const Volume& volume, const Passage& passage) : passage_(passage) {

@@ -61,6 +61,8 @@ Corners corners_of(const Volume& volume, const Index3& cell);
 /// docs/conventions.md but cubic_spline are all trilinear in the cell: differences of samples one voxel apart, clamped to the
 /// box, are interpolated differences of voxels.
 std::array<Cubic, 3> gradient_along(const Volume& volume, GradientRule rule, const Passage& passage);
+/// The same of the volume's means over 5^3 voxels, by central differences.
+std::array<Cubic, 3> mean_gradient_along(const Volume& volume, const Passage& passage);
 
 /// The gradient of the spline of Catmull and Rom through the 4x4x4 voxels around a cell: no trilinear field.
 class SplineGradient {

@@ -39,7 +39,7 @@ RayLight::RayLight(const Scene& scene, const Volume& volume, const Camera& camer
     const ShadingSettings& s = *settings_;
     has_corners_at_its_limits_ = s.model == ShadingModel::blinn_phong && s.power != PowerRule::parabola &&
                                  lamps_ == 1 && white_ && !(s.gradient_floor > 0) && s.ka + s.kd <= 1 &&
-                                 s.gradient != GradientRule::cubic_spline;
+                                 !(s.exaggeration > 0) && s.gradient != GradientRule::cubic_spline;
 }
 
 // C = (a kd c + cool) (1 - N.L) / 2 + (b kd c + warm) (1 + N.L) / 2, or with the sides exchanged (Guetat et
@@ -51,14 +51,19 @@ Reflection RayLight::tone(double facing) const {
     return {Vec3(s.kd * (s.cool_share * cool + s.warm_share * warm)), s.cool * cool + s.warm * warm, true};
 }
 
-Reflection RayLight::operator()(const Vec3& gradient) const {
+Reflection RayLight::operator()(const Vec3& gradient, const Vec3& mean) const {
     const ShadingSettings& s = *settings_;
     Vec3 diffuse{0, 0, 0}, specular{0, 0, 0};  // of white lamps: in x alone
     const double length = std::sqrt(gradient.dot(gradient));
     const double certain = s.gradient_floor > 0 ? std::min(1.0, length / s.gradient_floor) : 1;
     double facings = 0;
     if (length > shortest_) {
-        const Vec3 normal = gradient * (-1 / length);
+        Vec3 normal = gradient * (-1 / length);
+        if (s.exaggeration > 0) {
+            const double of_mean = std::sqrt(mean.dot(mean));
+            const Vec3 around = of_mean > shortest_ ? mean * (-1 / of_mean) : Vec3(0);
+            normal = (normal + (normal - around) * s.exaggeration).normalized();
+        }
         for (std::size_t l = 0; l < lamps_; ++l) {
             const Lamp& lamp = lamp_[l];
             double facing = normal.dot(lamp.towards);

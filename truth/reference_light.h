@@ -48,7 +48,8 @@ class RayLight {
     RayLight(const Scene& scene, const Volume& volume, const Camera& camera, const Vec3& ray_direction);
     /// `gradient` is in grid space, in levels per smallest voxel spacing.  A zero gradient gets only ambient
     /// light, and one below 2^-40 of the data's range counts as zero: a rounding error has a direction, too.
-    Reflection operator()(const Vec3& gradient) const;
+    /// `mean`: of the gradients about it, from which the normal is turned away where normals are exaggerated.
+    Reflection operator()(const Vec3& gradient, const Vec3& mean = Vec3(0)) const;
     /// Directions at a right angle to which a normal is at the limit of a lamp's light, or of its highlight.
     const std::vector<Vec3>& limits() const { return limits_; }
     /// Whether the light's value has corners there and nowhere else: one white lamp, no limit of a sum.

@@ -115,6 +115,10 @@ struct BoundedVolume {
     template <class W>
     auto neighbourhood(const std::array<W, 3>& at) const;
     template <class W>
+    auto box_sums(const std::array<W, 3>& at) const {
+        return neighbourhood(at);
+    }
+    template <class W>
     W nears_wall(const WallStage& walls, const std::array<W, 3>& at) const;
 };
 

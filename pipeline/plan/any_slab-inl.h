@@ -47,6 +47,11 @@ struct AnyVoxel {
         near.voxel.fill(voxel);
         return near;
     }
+    Neighbourhood<W> box_sums(const std::array<W, 3>&) const {
+        Neighbourhood<W> near;
+        near.voxel.fill(voxel * constant<W>(kBoxSide * kBoxSide * kBoxSide));
+        return near;
+    }
     W nears_wall(const WallStage&, const std::array<W, 3>&) const {
         return any_word(WordTag<W>{}, Range{0, 1}, 1);
     }

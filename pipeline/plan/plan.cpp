@@ -300,6 +300,7 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
     plan.inside = build_inside(in, plan.location);
     if (looks_twice(plan)) plan.walls = build_walls(plan.entries, std::int64_t{v.largest} + 1);
     plan.gradient = build_gradient(in);
+    if (plan.gradient.exaggerated.wanted) plan.box_gradient = build_box_gradient(in);
     plan.shading = build_shading(in);
     report_shading(plan);
     plan.compositing = build_compositing(in);
@@ -342,7 +343,8 @@ void set_active(Plan& plan, const std::array<bool, kWires>& rounded) {
     activate(plan.to_average);
     const auto is = [&](Wire w) { return rounded[static_cast<std::size_t>(w)]; };
     plan.input.active = is(Wire::classification_input);
-    plan.gradient.active = is(Wire::spacing);
+    plan.gradient.active = plan.box_gradient.active = is(Wire::spacing);
+    plan.gradient.exaggerated.active = is(Wire::exaggeration);
     plan.shading.active = is(Wire::material);
     plan.inside.to_whole.active = is(plan.inside.color_wire);
     plan.real = true;

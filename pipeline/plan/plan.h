@@ -51,6 +51,7 @@ struct Plan {
     LocationStage location;
     InterpolationStage interpolation;
     GradientStage gradient;
+    GradientStage box_gradient;  // of sums of 5^3 voxels, where normals are exaggerated
     InputStage input;
     ClassificationMethod method;
     ShadingStage shading;
@@ -109,6 +110,7 @@ void attach_statistics(Plan& plan, std::array<WireStatistics, kWires>& statistic
 template <class V>
 void visit_stages(Plan& plan, V&& v) {
     plan.location.visit(v), plan.interpolation.visit(v), plan.gradient.visit(v), plan.input.visit(v);
+    if (plan.gradient.exaggerated.wanted) plan.box_gradient.visit(v);
     std::visit([&](auto& method) { method.visit(v); }, plan.method);
     plan.inside.visit(v), plan.shading.visit(v), plan.compositing.visit(v);
 }

@@ -215,6 +215,22 @@ HWY_INLINE W confidence(const GradientStage& s, const std::array<W, 3>& g) {
     return quantise_raw(shift_left(part, s.confidence_fraction), s.to_confidence);
 }
 
+/// |g| with kNormalGuard fraction bits more, to a relative error of 2^-14.
+template <class W>
+HWY_INLINE W gradient_length(const std::array<W, 3>& gradient) {
+    std::array<W, 3> size;
+    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT { size[a] = absolute(gradient[a]); });
+    const W shift = constant<W>(kNormalBits) - bit_length(max(max(size[0], size[1]), size[2]));
+    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+        size[a] = within(shift_by(size[a], shift), 0, (std::int64_t{1} << kNormalBits) - 1);
+    });
+    return shift_by(vector_length(size, kNormalGuard), constant<W>(0) - shift);
+}
+template <RealWord W>
+HWY_INLINE W gradient_length(const std::array<W, 3>& g) {
+    return shift_left(square_root(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]), kNormalGuard);
+}
+
 /// Without rounding: the definition itself, but zero for what is no longer than a rounding.
 template <RealWord W>
 HWY_INLINE std::array<W, 3> normalise(const GradientStage& s, const std::array<W, 3>& g) {
@@ -225,6 +241,24 @@ HWY_INLINE std::array<W, 3> normalise(const GradientStage& s, const std::array<W
         return select(shortest < length, quantise_raw(g[a] * scale, s.to_normal), zero);
     };
     return {component(0), component(1), component(2)};
+}
+
+/// A gradient as long as it is, along -(N + e (N - M)): N its own normal, M that of the sums about its place.
+template <class W>
+HWY_INLINE std::array<W, 3> exaggerated(const GradientStage& s, const GradientStage& boxes,
+                                        const std::array<W, 3>& gradient, const std::array<W, 3>& of_boxes) {
+    const Exaggeration& e = s.exaggerated;
+    const W part = stage_constant<W>(e.raw, e.exact, e.fraction, e.active, Wire::exaggeration);
+    const std::array<W, 3> normal = normalise(s, gradient), mean = normalise(boxes, of_boxes);
+    std::array<W, 3> turned;
+    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+        turned[a] = shift_left(normal[a], e.fraction) + part * (normal[a] - mean[a]);
+    });
+    const std::array<W, 3> against = normalise(s, turned);
+    const W length = gradient_length(gradient);
+    for_three([&](std::size_t a)
+                  SQUINT_WRITTEN_OUT { turned[a] = quantise(length * against[a], e.to_length); });
+    return turned;
 }
 
 }  // namespace squint::HWY_NAMESPACE

@@ -24,6 +24,8 @@ std::vector<WireFormats> gradient_wires(const PresetInputs& in) {
              unsigned_spec(1, 12, trn), unsigned_spec(1, 20, kToEven)},
             {Wire::normal, signed_spec(1, 15 + sharp, kToEven), signed_spec(1, 12, trn),
              signed_spec(1, 7, trn), signed_spec(1, held(20 + sharp), kToEven)},
+            {Wire::exaggeration, unsigned_spec(3, 12, kToEven), unsigned_spec(3, 12, trn),
+             unsigned_spec(3, 5, trn), unsigned_spec(3, 16, kToEven)},
             {Wire::confidence, unsigned_spec(1, 15, kToEven), unsigned_spec(1, 15, trn),
              unsigned_spec(1, 8, trn), unsigned_spec(1, 20, kToEven)}};
 }
@@ -71,6 +73,34 @@ GradientStage build_gradient(const StageInputs& in) {
         // The sum of the gradients at a slab's ends is twice as long as their mean.
         fade_in_up_to(s, (lights_by_ends(in.inside) ? 2 : 1) * floor * one);
     }
+    Exaggeration& e = s.exaggerated;
+    e.exact = in.scene.shading.exaggeration;
+    e.wanted = in.lit && e.exact > 0;
+    e.raw = quantise_real(e.exact, in.specs[Wire::exaggeration]);
+    e.fraction = fraction(in, Wire::exaggeration);
+    e.to_length =
+        rescale(in, fraction(in, Wire::gradient) + kNormalGuard + s.normal_fraction, Wire::gradient);
+    return s;
+}
+
+GradientStage build_box_gradient(const StageInputs& in) {
+    WireSpecs specs = in.specs;
+    for (const Wire wire : {Wire::gradient_lerp, Wire::gradient}) {
+        Format& f = specs[wire].format;
+        f.integer_bits += kBoxBits, f.fraction_bits = std::max(0, f.fraction_bits - kBoxBits);
+    }
+    Scene scene = in.scene;
+    scene.shading.gradient = GradientRule::central;
+    scene.shading.gradient_floor = scene.shading.exaggeration = 0;
+    StageInputs boxes{.scene = scene,
+                      .specs = specs,
+                      .volume = in.volume,
+                      .entries = in.entries,
+                      .camera = in.camera,
+                      .most_steps = in.most_steps,
+                      .lit = in.lit};
+    GradientStage s = build_gradient(boxes);
+    s.vanishing *= kBoxSide * kBoxSide * kBoxSide;
     return s;
 }
 

@@ -17,6 +17,17 @@ namespace squint {
 
 struct StageInputs;
 
+/// shading.exaggeration: the normal is turned from the mean of the gradients at the 5^3 voxels about a place, which is
+/// the gradient of the volume's sums over 5^3 (Guetat et al. 2010, section 5; docs/papers/guetat.md).
+struct Exaggeration {
+    bool wanted = false;
+    std::int64_t raw = 0;  // e
+    double exact = 0;
+    int fraction = 0;
+    bool active = true;  // Real: e rounded or exact
+    Rescale to_length;   // of a unit vector times a length, to a gradient
+};
+
 struct GradientStage {
     GradientRule rule = GradientRule::central;
     int weight_bits = 0;
@@ -45,14 +56,20 @@ struct GradientStage {
     // cubic_spline: weights of four voxels.
     int spline_fraction = 0;
     Rescale to_spline;
+    Exaggeration exaggerated;
 
     template <class V>
     void visit(V&& v) {
         v(to_first), v(to_second), v(to_gradient), v(to_scaled), v(to_normal), v(to_confidence), v(to_spline);
+        v(exaggerated.to_length);
     }
 };
 /// Builds the stage's constants.  Throws InputError where a wire is unsigned and the scene is lit.
 GradientStage build_gradient(const StageInputs& in);
+/// The same for the gradient of sums of 5^3 voxels: central differences, in the formats of a mean.
+GradientStage build_box_gradient(const StageInputs& in);
+/// Integer bits that a sum of 5^3 has beside its mean.
+inline constexpr int kBoxBits = 7, kBoxSide = 5;
 
 /// Bits that normalising keeps of the largest component, and fraction bits of the length.
 inline constexpr int kNormalBits = 15, kNormalGuard = 8;

@@ -151,6 +151,9 @@ StageWays ways_of(const Plan& plan) {
 std::optional<std::string> what_needs_the_model(const Plan& plan) {
     if (plan.real && !plan.float32) return "nothing is rounded";
     if (lights_fade(plan.inside.rule)) return "light that fades inside slabs is drawn by the model";
+    if (plan.gradient.exaggerated.wanted && (plan.float32 || plan.gradient_from_samples()))
+        return fmt::format("exaggerated normals of {} are drawn by the model",
+                           plan.float32 ? "floats" : "gradients from samples");
     if (plan.float32) {  // formats do not matter
         if (plan.projection_mode) return "mip, minip and average of floats run in the model";
         if (plan.scene.output.depth || plan.scene.output.normals)
@@ -173,6 +176,8 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
             return obstacle;
     }
     if (const auto obstacle = too_wide("classification input", plan.input_needs)) return obstacle;
+    if (plan.gradient.exaggerated.wanted && plan.word_bits > 64)
+        return "exaggerated normals are turned in 64 bits";
     if (plan.lit && plan.specs[Wire::normal].overflow == Overflow::wrap)
         return "a normal that wraps round is divided by the model";
     if (const int carried = plan.compositing.to_contribution.shift;

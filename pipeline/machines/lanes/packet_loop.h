@@ -2,6 +2,7 @@
 #pragma once
 
 #include "pipeline/machines/aovs.h"
+#include "pipeline/machines/lanes/exaggerated.h"
 #include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/machines/lanes/packet.h"
 #include "pipeline/machines/model.h"
@@ -289,6 +290,7 @@ class PacketLoop {
     void find_gradients(int count, LitSamples& lit) {
         look_around(count, lit);
         kernels_.find_gradients(plan_, count, lit);
+        if (plan_.gradient.exaggerated.wanted) exaggerate(plan_, count, lit);
     }
     // Its second half, and stage 5.
     void shade(int count, LitSamples& lit) {

@@ -106,6 +106,7 @@ void draw_light(Draw& draw, Scene& scene) {
     shading.gradient =
         draw.one_of({GradientRule::central, GradientRule::sobel, GradientRule::analytic,
                      GradientRule::central, GradientRule::central_samples, GradientRule::cubic_spline});
+    if (draw.once_in(12)) shading.exaggeration = draw.one_of({1.0, draw.real(0, 7)});
     shading.ka = draw.real(0, 1), shading.kd = draw.real(0, 1), shading.ks = draw.real(0, 1);
     shading.power = draw.any_of<PowerRule>();
     shading.exponent = shading.power == PowerRule::squaring
