@@ -1,0 +1,195 @@
+// Stages whose bound is tighter than that of their operations, and the composition over bounded words: whoever
+// includes this runs it.
+#pragma once
+
+#include "pipeline/machines/certificate/payers.h"
+#include "pipeline/stages/ray_setup-inl.h"
+
+#include "pipeline/classification/entries-inl.h"
+#include "pipeline/stages/compositing-inl.h"
+#include "pipeline/stages/interpolation-inl.h"
+#include "pipeline/stages/location-inl.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <concepts>
+
+namespace squint {
+
+// A set-up value: what its word is off by is known; no error where it is representable.
+template <class W>
+requires std::same_as<W, Bounded> W word_from(double value, const Spec& spec, const Rescale& to) {
+    const std::int64_t raw = quantise_real(value, spec);
+    const double off = std::abs(static_cast<double>(raw) - value * static_cast<double>(spec.format.one()));
+    return with_error(raw, Shares::one(to.wire, rounding_of(off, spec.rounding)));
+}
+
+/// A word of zero stands for one; without rounding it may be anything that its error allows, and stays what it is.
+template <class W, class N>
+requires std::same_as<W, Bounded> N divisor(const N& x) {
+    if (x.exact || x.v > 0) return x.v > 0 ? x : constant<Bounded>(1);
+    return {1, false, x.error + Shares::one(-1, 1)};
+}
+
+/// The trilinear field is continuous over cell faces: a location that errs is a displacement of the point, not a
+/// matter of cells.  The word's cell is the cell; the weight carries the displacement.
+inline CellPosition<Bounded> cell_position(const LocationStage& s, const std::array<Bounded, 3>& location) {
+    CellPosition<Bounded> position;
+    for (std::size_t a = 0; a < 3; ++a) {
+        const Int128 cell = std::min<Int128>(location[a].v >> s.location_fraction, s.last_cell[a]);
+        position.cell[a] = {cell, true, {}};
+        Bounded rest = location[a];
+        rest.v -= cell << s.location_fraction;
+        position.weight[a] = quantise(rest, s.to_weight);
+    }
+    return position;
+}
+
+/// A cell in its volume: what lies beside it counts where an error leads there.
+struct BoundedCell {
+    const Volume& volume;
+    std::array<std::int64_t, 3> at;
+    Cell<Int128> corners;
+
+    std::int64_t voxel(std::int64_t x, std::int64_t y, std::int64_t z) const {
+        const Index3& d = volume.dims;
+        return volume.at(std::min(x, d.x - 1), std::min(y, d.y - 1), std::min(z, d.z - 1));
+    }
+    /// The steepest edges of the cells [low, high] along each axis, levels a voxel.
+    std::array<double, 3> slopes(const std::array<std::int64_t, 3>& low,
+                                 const std::array<std::int64_t, 3>& high) const {
+        std::array<double, 3> steepest{};
+        for (std::int64_t z = low[2]; z <= high[2] + 1; ++z)
+            for (std::int64_t y = low[1]; y <= high[1] + 1; ++y)
+                for (std::int64_t x = low[0]; x <= high[0] + 1; ++x) {
+                    const std::int64_t here = voxel(x, y, z);
+                    const auto take = [&](std::size_t axis, std::int64_t next) {
+                        steepest[axis] = std::max(steepest[axis], std::abs(static_cast<double>(next - here)));
+                    };
+                    if (x <= high[0]) take(0, voxel(x + 1, y, z));
+                    if (y <= high[1]) take(1, voxel(x, y + 1, z));
+                    if (z <= high[2]) take(2, voxel(x, y, z + 1));
+                }
+        return steepest;
+    }
+};
+struct BoundedVolume {
+    const Volume& volume;
+    BoundedCell cell(const std::array<Bounded, 3>& at) const;
+    template <class W>
+    auto neighbourhood(const std::array<W, 3>& at) const;
+    template <class W>
+    auto box_sums(const std::array<W, 3>& at) const {
+        return neighbourhood(at);
+    }
+    template <class W>
+    W nears_wall(const WallStage& walls, const std::array<W, 3>& at) const;
+};
+
+/// Lerps are contractions in their values, so what the point is displaced by counts with the steepest edges of the cells
+/// that it can reach, and every level's own rounding once.
+inline Bounded interpolate(const InterpolationStage& s, const BoundedCell& cell,
+                           const std::array<Bounded, 3>& weight) {
+    const Int128 word = HWY_NAMESPACE::interpolate(
+        s, cell.corners, std::array<Int128, 3>{weight[0].v, weight[1].v, weight[2].v});
+    // What the three levels have taken: none of them can be told from the others.
+    const int bits = s.weight_bits;
+    const long double part = std::ldexp(1.0L, -bits);
+    const auto lerp = [&](long double a, long double b, std::size_t axis) {
+        return a == b ? a : a + static_cast<long double>(weight[axis].v) * part * (b - a);
+    };
+    const auto at = [&](int i) { return static_cast<long double>(cell.corners.at(i)); };
+    const long double z0 = lerp(lerp(at(0), at(1), 0), lerp(at(2), at(3), 0), 1);
+    const long double z1 = lerp(lerp(at(4), at(5), 0), lerp(at(6), at(7), 0), 1);
+    const long double exact = std::ldexp(lerp(z0, z1, 2), s.sample_fraction);
+    auto taken = static_cast<double>(std::abs(static_cast<long double>(word) - exact));
+    if (taken > 0) taken += static_cast<double>(exact) * 0x1p-58;  // long doubles have 64 bits
+    Shares error;
+    const double one = std::ldexp(1.0, s.sample_fraction);
+    const auto of_level = [&](const Rescale& to, int bits_after) {
+        return unit_of(to) * std::ldexp(1.0, s.sample_fraction - bits_after);
+    };
+    const int x_bits = bits - s.to_x.shift, y_bits = x_bits + bits - s.to_y.shift;
+    add_local(error, taken,
+              {{index_of(Wire::lerp_x), of_level(s.to_x, x_bits)},
+               {index_of(Wire::lerp_y), of_level(s.to_y, y_bits)},
+               {index_of(Wire::sample), unit_of(s.to_sample)}});
+    if (weight[0].exact && weight[1].exact && weight[2].exact) return with_error(word, error);
+
+    std::array<std::int64_t, 3> low{}, high{};
+    const double whole = std::ldexp(1.0, bits);
+    bool far = false;
+    for (std::size_t a = 0; a < 3; ++a) {
+        const double place = in_double(weight[a].v) / whole, off = weight[a].most() / whole * (1 + 1e-9);
+        const std::int64_t last = std::max<std::int64_t>(cell.volume.dims[static_cast<int>(a)] - 2, 0);
+        far = far || !(off < 4);
+        const auto reached = [&](double p) {
+            return std::clamp<std::int64_t>(cell.at[a] + static_cast<std::int64_t>(std::floor(p)), 0, last);
+        };
+        if (far) continue;
+        low[a] = reached(place - off);
+        high[a] = std::max(low[a], reached(std::ceil(place + off) - 1));
+    }
+    const auto range = static_cast<double>(cell.volume.largest - cell.volume.smallest);
+    const std::array<double, 3> slope =
+        far ? std::array<double, 3>{range, range, range} : cell.slopes(low, high);
+    for (std::size_t a = 0; a < 3; ++a)
+        if (slope[a] > 0) error.add(weight[a].error, slope[a] * one / whole);
+    return with_error(word, error);
+}
+
+/// Entries a level are a constant of 20 bits: what it is off by is known.
+inline Bounded classification_input(const InputStage& s, const Bounded& sample) {
+    const Int128 word = HWY_NAMESPACE::classification_input(s, sample.v);
+    if (!s.scaled) {
+        const Bounded input = quantise(sample, s.to_input);
+        return clamp(input, constant<Bounded>(0), constant<Bounded>(s.highest));
+    }
+    const double scale = s.scale_exact * std::ldexp(1.0, s.scale_fraction - s.to_input.shift);
+    const double exact = std::clamp(in_double(sample.v) * scale, 0.0, static_cast<double>(s.highest));
+    Shares error = sample.error.scaled(scale);
+    add_local(error, std::abs(in_double(word) - exact),
+              {{index_of(Wire::classification_input), unit_of(s.to_input)}, {Shares::kElsewhere, 0.0}});
+    error[kDoublesPay] += exact * 0x1p-50;
+    return with_error(word, error);
+}
+
+/// Words alone: errors of C and T are the ray's, not the slab's (ray.h).
+inline void composite(const CompositingStage& s, Accumulated<Bounded>& pixel,
+                      const std::array<Bounded, 3>& color, const Bounded& alpha) {
+    Accumulated<Int128> words{
+        {pixel.color[0].v, pixel.color[1].v, pixel.color[2].v}, pixel.transparency.v, pixel.remainder.v};
+    HWY_NAMESPACE::composite(s, words, {color[0].v, color[1].v, color[2].v}, alpha.v);
+    for (std::size_t c = 0; c < 3; ++c) pixel.color[c].v = words.color[c];
+    pixel.transparency.v = words.transparency, pixel.remainder.v = words.remainder;
+}
+
+}  // namespace squint
+
+#include "pipeline/slab-inl.h"
+
+namespace squint {
+
+inline BoundedCell BoundedVolume::cell(const std::array<Bounded, 3>& at) const {
+    const std::array<std::int64_t, 3> place{static_cast<std::int64_t>(at[0].v),
+                                            static_cast<std::int64_t>(at[1].v),
+                                            static_cast<std::int64_t>(at[2].v)};
+    const HWY_NAMESPACE::FromVolume voxels{volume};
+    return {volume, place, voxels.cell(std::array<Int128, 3>{at[0].v, at[1].v, at[2].v})};
+}
+// Lit scenes are not bounded yet: a word that nothing is known of.
+template <class W>
+auto BoundedVolume::neighbourhood(const std::array<W, 3>&) const {
+    HWY_NAMESPACE::Neighbourhood<W> none;
+    none.voxel.fill(unbounded(0));
+    return none;
+}
+
+// Nor are slabs looked at twice.
+template <class W>
+W BoundedVolume::nears_wall(const WallStage&, const std::array<W, 3>&) const {
+    return unbounded(0);
+}
+
+}  // namespace squint
