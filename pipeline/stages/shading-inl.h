@@ -55,7 +55,10 @@ HWY_INLINE decltype(auto) with_model(ShadingModel model, F&& f) {
 template <class W>
 HWY_INLINE void shade(const ShadingStage& s, const RayWords<W>& ray, const std::array<W, 3>& normal, W alpha,
                       std::array<W, 3>& color, W confidence = constant<W>(0)) {
-    const W opacity = s.premultiplied ? alpha : constant<W>(std::int64_t{1} << s.color_fraction);
+    const int finer = s.finer_than_alpha;
+    const W opacity = !s.premultiplied ? constant<W>(std::int64_t{1} << s.color_fraction)
+                      : finer >= 0     ? shift_left(alpha, finer)
+                                       : floor_shift(alpha, -finer);
     with_model(s.model, [&]<class M>(M model) SQUINT_WRITTEN_OUT {
         const Reflection<W> light = reflect(model, s, ray, normal, confidence);
         for (std::size_t c = 0; c < 3; ++c) {

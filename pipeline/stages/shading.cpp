@@ -86,6 +86,7 @@ ShadingStage build_shading(const StageInputs& in) {
     s.model = settings.model, s.power = settings.power, s.two_sided = settings.two_sided;
     s.premultiplied = in.premultiplied;
     s.color_fraction = s.premultiplied ? fraction(in, Wire::slab_color) : fraction(in, Wire::slab_ratio);
+    if (s.premultiplied) s.finer_than_alpha = s.color_fraction - fraction(in, Wire::slab_alpha);
     s.light_fraction = fraction(in, Wire::light), s.normal_fraction = fraction(in, Wire::normal);
     s.dot_fraction = fraction(in, Wire::dot), s.power_fraction = fraction(in, Wire::power);
     s.intensity_fraction = fraction(in, Wire::intensity), s.material_fraction = fraction(in, Wire::material);

@@ -56,7 +56,8 @@ struct ShadingConstants {
     PowerRule power = PowerRule::squaring;
     int lights = 0;
     bool premultiplied = false;  // of the slab's colour; then alpha weighs the highlight, too
-    int color_fraction = 0;      // of the slab's colour, and of alpha if premultiplied
+    int color_fraction = 0;      // of the slab's colour
+    int finer_than_alpha = 0;    // its fraction bits above alpha's, if premultiplied
     bool white = true;           // every light is white, so one sum serves all three colours
     bool two_sided = false;
     bool fades = false;         // confidence weighs what lights add to ambient light

@@ -101,6 +101,20 @@ TEST(InsideRules, AgreeWhereTheNormalDoesNotTurn) {
             << "one piece has the bits of mean";
 }
 
+// Colours that bring their opacity may have other fraction bits than opacities: a highlight is as bright.
+TEST(InsideRules, LightColoursThatAreFinerOrCoarserThanOpacities) {
+    for (const char* method : {"pi2d", "pi1d"})
+        for (const char* color : {"u1.19 rnd", "u1.12 rnd"}) {
+            const std::string format = std::string("precision.slab_color=") + color;
+            EXPECT_LE(
+                largest_difference(picture_of(plan_with(method, "mean", {"volume.procedural=ramp", format})),
+                                   picture_of(plan_with(
+                                       method, "mean", {"volume.procedural=ramp", "precision.preset=real"}))),
+                4.0 / 255)
+                << method << ' ' << color;
+        }
+}
+
 // Zero gradients, at both ends and between: ambient light alone.
 TEST(InsideRules, GiveEvenMatterAmbientLight) {
     for_every_rule([](const std::string& method, const std::string& rule) {
