@@ -147,6 +147,15 @@ inline Bounded max(const Bounded& a, const Bounded& b) {
     const Truth less = a < b;
     return less ? lesser_or_greater(b, a, less) : lesser_or_greater(a, b, less);
 }
+/// Between limits that have no error, with rounding and without: no further off than the limits are.
+inline Bounded clamp(const Bounded& x, const Bounded& low, const Bounded& high) {
+    Bounded y = min(max(x, low), high);
+    if (y.exact || !low.exact || !high.exact) return y;
+    const double most = static_cast<double>(std::max(y.v - low.v, high.v - y.v));
+    if (const double off = y.most(); off > most)
+        y.error = std::isfinite(off) ? y.error.scaled(most / off) : Shares::one(-1, most);
+    return y;
+}
 inline Bounded absolute(const Bounded& x) {
     return {absolute(x.v), x.exact, x.error};
 }

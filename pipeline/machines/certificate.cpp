@@ -2,8 +2,10 @@
 
 #include "core/error.h"
 #include "pipeline/machines/certificate/methods.h"
+#include "pipeline/machines/certificate/premultiplied.h"
 #include "pipeline/machines/certificate/ray.h"
 #include "pipeline/machines/certificate/stages.h"
+#include "pipeline/record.h"
 #include "pipeline/render.h"
 
 #include <fmt/format.h>
@@ -30,10 +32,12 @@ struct Row {
 };
 
 template <class M>
-void certify_row(const Plan& plan, const M& bounded_method, int row, int payer, Image* image, Row& to) {
+void certify_row(const Plan& plan, const M& bounded_method, int row, const CertificateOptions& options,
+                 Image* image, Row& to) {
+    const int every = std::max(options.every, 1);
     const BoundedVolume voxels{*plan.volume};
     BoundedRay ray(plan);
-    for (int column = 0; column < plan.camera.width; ++column) {
+    for (int column = 0; column < plan.camera.width; column += every) {
         const RaySetup setup = plan.set_up(column, row);
         if (setup.slabs == 0) continue;
         ray.begin();
@@ -55,8 +59,10 @@ void certify_row(const Plan& plan, const M& bounded_method, int row, int payer, 
             const Shares lsb8 = bound[c].scaled(255);
             const double sum = lsb8.sum();
             most = std::max(most, sum);
-            doubts[0] = doubts[0] || lsb8[kWallsPay] > kUndecided;
-            doubts[1] = doubts[1] || lsb8[kTerminationPays] > kUndecided;
+            constexpr std::array<int, kDoubtNames.size()> kDoubtful{kWallsPay, kTerminationPays,
+                                                                    kGradientsPay};
+            for (std::size_t d = 0; d < doubts.size(); ++d)
+                doubts[d] = doubts[d] || lsb8[kDoubtful[d]] > kUndecided;
             part.greatest = greatest(part.greatest, lsb8);
             if (sum > part.most)
                 part.most = sum, part.shares = lsb8, part.column = column, part.row = row,
@@ -65,14 +71,14 @@ void certify_row(const Plan& plan, const M& bounded_method, int row, int payer, 
                 const std::size_t at =
                     static_cast<std::size_t>(row) * static_cast<std::size_t>(image->width) +
                     static_cast<std::size_t>(column);
-                const double value = payer < 0 ? bound[c].sum() : bound[c][payer];
+                const double value = options.payer < 0 ? bound[c].sum() : bound[c][options.payer];
                 auto stored = static_cast<float>(value);
                 if (static_cast<double>(stored) < value) stored = std::nextafter(stored, 2.0f);
                 image->channels[c].values[at] = stored;
             }
         }
         for (std::size_t d = 0; d < doubts.size(); ++d) part.undecided[d] += doubts[d];
-        if (doubts[0] || doubts[1])
+        if (std::find(doubts.begin(), doubts.end(), true) != doubts.end())
             ++part.undecided_rays;
         else
             part.most_decided = std::max(part.most_decided, most);
@@ -85,7 +91,7 @@ void certify_row(const Plan& plan, const M& bounded_method, int row, int payer, 
 std::string_view payer_name(int payer) {
     if (payer < kWires) return kWireInfo[static_cast<std::size_t>(payer)].name;
     constexpr std::array<std::string_view, kPayers - kWires> kNames{"rows of tables", "walls", "termination",
-                                                                    "doubles"};
+                                                                    "gradients", "doubles"};
     return payer < kPayers ? kNames[static_cast<std::size_t>(payer - kWires)] : "constants";
 }
 
@@ -127,20 +133,27 @@ nlohmann::ordered_json json_of(const Certificate& c) {
 std::optional<std::string> what_is_not_bounded(const Plan& plan) {
     if (plan.real)
         return fmt::format("precision.preset {} rounds nothing; allowed: any other preset", plan.real_name());
-    const bool is_series = std::holds_alternative<PowerSeriesOfOrder1>(plan.method);
-    if (!std::holds_alternative<PostClassification>(plan.method) && !is_series)
-        return fmt::format(
-            "classification.method {}{} is not bounded yet; allowed: pc, pc_mid, pips of order 1",
-            name_of(plan.scene.classification.method),
-            plan.scene.classification.method == Method::pips ? " of this order" : "");
+    if (plan.scene.classification.as_printed)
+        return "classification.as_printed is not bounded; allowed: false";
     const WallRule walls = plan.scene.classification.opaque_prediction;
-    if (plan.walls.looks_twice || (is_series && plan.entries.any_opaque() && walls == WallRule::none))
+    if (plan.walls.looks_twice || (!std::holds_alternative<PostClassification>(plan.method) &&
+                                   plan.entries.any_opaque() && walls == WallRule::none))
         return fmt::format(
             "opaque entries with classification.opaque_prediction {} are not bounded yet; allowed: ends",
             name_of(walls));
-    if (plan.lit) return "light is not bounded yet; allowed: shading.model none, or no lights";
-    if (plan.interpolation.nearest)
-        return "sampling.interpolation nearest jumps from voxel to voxel; allowed: trilinear";
+    if (!plan.lit) return {};
+    if (plan.gradient.rule == GradientRule::cubic_spline)
+        return "shading.gradient cubic_spline is not bounded yet; allowed: central, central_samples, "
+               "analytic, "
+               "sobel";
+    if (plan.gradient.exaggerated.wanted) return "shading.exaggeration is not bounded yet; allowed: 0";
+    if (lights_fade(plan.inside.rule))
+        return fmt::format("shading.inside {} is not bounded yet; allowed: mean, front, middle, adaptive",
+                           name_of(plan.inside.rule));
+    if (plan.inside.rule == InsideRule::adaptive && plan.inside.one_alpha < 1 << 15)
+        return "shading.inside adaptive cuts other slabs where precision.slab_alpha has few bits; allowed: "
+               "15 or more "
+               "fraction bits";
     return {};
 }
 
@@ -163,19 +176,30 @@ Certificate certify(const Plan& plan, const CertificateOptions& options) {
         arena.execute([&] {
             tbb::parallel_for(0, plan.camera.height, [&](int row) {
                 if (options.cancelled && *options.cancelled) stopped = true;
-                if (!stopped)
-                    certify_row(plan, method, row, options.payer, image, rows[static_cast<std::size_t>(row)]);
+                if (!stopped && row % std::max(options.every, 1) == 0)
+                    certify_row(plan, method, row, options, image, rows[static_cast<std::size_t>(row)]);
             });
         });
     };
     if (const auto* words = std::get_if<PostClassification>(&plan.method)) {
         certify_all(BoundedPostClassification{*words, function});
+    } else if (const auto* cells = std::get_if<PreIntegrated2D>(&plan.method)) {
+        const Plan real = real_plan(plan);
+        certify_all(BoundedCells{*cells, std::get<PreIntegrated2D>(real.method), function});
+    } else if (const auto* means = std::get_if<PreIntegrated1D>(&plan.method)) {
+        const Plan real = real_plan(plan);
+        const Function of_means = Function::of_means(plan, means->is_opacity);
+        certify_all(BoundedMeans{*means, std::get<PreIntegrated1D>(real.method), function, of_means});
     } else {
-        const auto& series = std::get<PowerSeriesOfOrder1>(plan.method);
+        const bool legendre = plan.scene.classification.method == Method::leg;
+        const auto* first = std::get_if<PowerSeriesOfOrder1>(&plan.method);
+        const int order = first ? 1 : std::get<MomentSeries>(plan.method).order;
         preintegration::ExactSeries exact = preintegration::build_exact_series(
-            plan.entries, 1, false, plan.scene.classification.opaque_prediction != WallRule::none);
+            plan.entries, order, legendre, plan.scene.classification.opaque_prediction != WallRule::none);
         exact.step = full_step(plan);
-        certify_all(BoundedPowerSeries{series, function, exact});
+        BoundedPowerSeries series{first, function, exact, series_kernel(order, legendre)};
+        if (!first) series.words = &std::get<MomentSeries>(plan.method);
+        certify_all(series);
     }
     if (stopped) throw Cancelled{};
     std::vector<float> most;

@@ -32,6 +32,7 @@ enum Payer : int {
     kRowsPay = kWires,  // tables: straight between rows where the curve bends
     kWallsPay,          // an opaque entry that errors may reach or miss
     kTerminationPays,   // a ray may end a slab earlier or later
+    kGradientsPay,      // a gradient that errors may turn into any direction
     kDoublesPay,        // roundings of the doubles of the unrounded picture and of the bound
     kPayers,
 };
@@ -39,14 +40,15 @@ static_assert(kPayers <= Shares::kElsewhere);
 std::string_view payer_name(int payer);
 
 /// Why a ray is undecided: what errors can flip is more than kUndecided of its bound.
-enum class Doubt { wall, termination };
-inline constexpr std::array<std::string_view, 2> kDoubtNames{"wall", "termination"};
+enum class Doubt { wall, termination, gradient };
+inline constexpr std::array<std::string_view, 3> kDoubtNames{"wall", "termination", "gradient"};
 inline constexpr double kUndecided = 0.5;  // LSB8
 
 struct CertificateOptions {
     int threads = 0;        // 0: one a processor
     bool channels = false;  // keep the bound of every pixel
     int payer = -1;         // of the bound of every pixel only this one's share
+    int every = 1;          // rows and columns: the first of so many
     const std::atomic<bool>* cancelled = nullptr;
 };
 

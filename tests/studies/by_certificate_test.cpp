@@ -77,13 +77,15 @@ TEST_F(ByCertificate, SaysWhoBindsWhereABoundCannotBeMet) {
 
 TEST_F(ByCertificate, RefusesWhatIsNotBoundedInOneLine) {
     Settings s = small(1);
-    s.overrides.pop_back();
+    s.overrides.insert(s.overrides.end(),
+                       {"lights=[{headlight=true}]", "classification.method=pi2d", "shading.inside=linear"});
     try {
         run_by_certificate(s);
-        FAIL() << "light was not refused";
+        FAIL() << "light that fades was not refused";
     } catch (const InputError& error) {
-        EXPECT_THAT(error.what(),
-                    HasSubstr("--guarantee pictures: the built-in scene: light is not bounded yet"));
+        EXPECT_THAT(
+            error.what(),
+            HasSubstr("--guarantee pictures: the built-in scene: shading.inside linear is not bounded yet"));
     }
 }
 

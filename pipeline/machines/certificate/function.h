@@ -1,6 +1,7 @@
 // The transfer function over an interval of inputs, as no word has it.
 #pragma once
 
+#include "core/portable_math.h"
 #include "pipeline/plan/plan.h"
 
 #include <algorithm>
@@ -34,6 +35,17 @@ class Function {
         }
     }
     enum Curve : std::size_t { red, green, blue, depth };
+    /// Of pi1d: what its means are of.  `depth` is an entry's opacity (Kye), or its depth up to 1 (Engel), `red` to
+    /// `blue` that times the colour; an opaque entry counts 1.
+    static Function of_means(const Plan& plan, bool is_opacity) {
+        Function f(plan);
+        for (std::size_t i = 0; i < f.opaque_.size(); ++i) {
+            double& value = f.curve_[depth][i];
+            value = f.opaque_[i] ? 1 : is_opacity ? -portable::expm1(-value) : std::min(value, 1.0);
+            for (std::size_t c = 0; c < 3; ++c) f.curve_[c][i] *= value;
+        }
+        return f;
+    }
     int last() const { return static_cast<int>(opaque_.size()) - 1; }
 
     double at(std::size_t curve, double input) const {
@@ -51,6 +63,17 @@ class Function {
         for (int i = static_cast<int>(low) + 1; i < high; ++i)
             all.take(curve_[curve][static_cast<std::size_t>(i)]);
         return all;
+    }
+    /// The mean of a curve between two inputs.
+    double mean(std::size_t curve, double from, double to) const {
+        const double low = std::min(from, to), high = std::max(from, to);
+        if (!(low < high)) return at(curve, low);
+        double sum = 0, here = low;
+        while (here < high) {
+            const double next = std::min(std::floor(here) + 1, high);
+            sum += (next - here) * (at(curve, here) + at(curve, next)) / 2, here = next;
+        }
+        return sum / (high - low);
     }
     /// The steepest segment of a curve over [low, high], per entry.
     double slope(std::size_t curve, double low, double high) const {

@@ -3,6 +3,8 @@
 #include "core/portable_math.h"
 #include "pipeline/classification/entries-inl.h"
 #include "pipeline/classification/methods-inl.h"
+#include "pipeline/classification/tables/legendre.h"
+#include "pipeline/classification/tables/power_series.h"
 #include "pipeline/machines/certificate.h"
 
 #include <algorithm>
@@ -97,12 +99,24 @@ Slab<Bounded> classify(const BoundedPostClassification& m, const Bounded& input,
     return slab;
 }
 
+SeriesKernel series_kernel(int order, bool legendre) {
+    using preintegration::legendre_split_depth;
+    using preintegration::trusted_depth;
+    // Greatest values over [0, trusted_depth] and [0, legendre_split_depth], rounded up.
+    constexpr double kPips[][3] = {{2, 2, 4}, {1.5, 3, 2.7}, {2.1, 3.2, 4.3}, {2.5, 11, 8.3}};
+    constexpr double kLeg[][3] = {{1.8, 1.5, 0.5}, {2, 2.7, 0.8}, {2.8, 6.5, 1.2}};
+    if (order == 1) return {};
+    const auto& of = legendre ? kLeg[order - 2] : kPips[order - 2];
+    return {of[0], of[1], of[2], legendre ? legendre_split_depth(order) : trusted_depth(order)};
+}
 Slab<Bounded> classify(const BoundedPowerSeries& m, const Bounded& front, const Bounded& back,
                        const Bounded& length) {
-    const PrefixLookup& prefix = m.words.prefix;
+    const PrefixLookup& prefix =
+        std::visit([](auto* words) -> const PrefixLookup& { return words->prefix; }, m.words);
     const EntryLookup& e = prefix.entries;
     const Function& f = m.function;
-    const Slab<Int128> word = HWY_NAMESPACE::classify(m.words, front.v, back.v, length.v);
+    const Slab<Int128> word = std::visit(
+        [&](auto* words) { return HWY_NAMESPACE::classify(*words, front.v, back.v, length.v); }, m.words);
 
     const double unit = std::ldexp(1.0, -e.input_fraction), full = std::ldexp(1.0, e.length_fraction);
     const auto last = static_cast<double>(f.last());
@@ -159,14 +173,24 @@ Slab<Bounded> classify(const BoundedPowerSeries& m, const Bounded& front, const 
         // x dK = int (c - K) dtau + int tau dc.
         const double mean = l > 0 ? depth / l : -std::log1p(-seen.alpha),
                      least = std::max(mean - steep * (from_off + to_off) / 2, depths.low);
+        const double outside = std::numeric_limits<double>::infinity();
+        // The share of the depth that the ends' displacement adds or takes.
+        const double all_depth = mean * std::abs(to - from), moved_depth = depths.high * (from_off + to_off),
+                     share = all_depth > moved_depth ? moved_depth / (all_depth - moved_depth) : outside;
+        const SeriesKernel& k = m.kernel;
         for (std::size_t c = 0; c < 3; ++c) {
             const Reach colors = f.over(c, low, high);
-            const double all = colors.from(straight[c]),
-                         own = f.slope(c, low, high) * std::max(from_off, to_off);
-            const double of_depth = least > 0 && seen.alpha > 0
-                                        ? (colors.high - colors.low) * steep * (from_off + to_off) / 2 / least
-                                        : std::numeric_limits<double>::infinity();
-            to_ends(color_error[c], std::min(all, of_depth + own), from_off, to_off, 0);
+            const double swing = colors.high - colors.low;
+            const double all = colors.from(straight[c]) + (k.most - 1) * swing;
+            double by_ends = outside;
+            if (m.exact.order == 1 || (!m.exact.legendre && depth - shift > k.up_to)) {
+                if (least > 0 && seen.alpha > 0)
+                    by_ends = swing * steep * (from_off + to_off) / 2 / least +
+                              f.slope(c, low, high) * std::max(from_off, to_off);
+            } else if (depth + shift <= k.up_to) {
+                by_ends = swing / 2 * ((3 * k.most + 2 * k.slope) * share + k.by_depth * shift);
+            }
+            to_ends(color_error[c], std::min(all, by_ends), from_off, to_off, l_off);
         }
     } else {
         // The first opaque place on the way, and whether both ways surely meet it.
@@ -196,13 +220,15 @@ Slab<Bounded> classify(const BoundedPowerSeries& m, const Bounded& front, const 
             const double deep = f.over(Function::depth, std::max(a, 0.0), std::min(b, last)).high;
             const double moves =
                 l * (deep * (from_off + to_off) / span + part * steep * from_off) + l_off * deep;
+            const double of_order =
+                m.exact.order == 1 ? 0 : (3 * m.kernel.most + 2 * m.kernel.slope + m.kernel.by_depth) / 2;
             for (std::size_t c = 0; c < 3; ++c) {
                 const double swing = reach[c].high - reach[c].low;
-                to_ends(
-                    color_error[c],
-                    std::min(reach[c].from(straight[c]),
-                             2 * swing * moves + f.slope(c, std::max(a, 0.0), std::min(b, last)) * from_off),
-                    from_off, to_off, l_off > 0 ? l_off : 0);
+                to_ends(color_error[c],
+                        std::min(reach[c].from(straight[c]),
+                                 (2 + of_order) * swing * moves +
+                                     f.slope(c, std::max(a, 0.0), std::min(b, last)) * from_off),
+                        from_off, to_off, l_off > 0 ? l_off : 0);
             }
         } else {
             const double least = opacity(depths.low * std::max(l - l_off, 0.0));

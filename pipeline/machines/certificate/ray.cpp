@@ -23,26 +23,35 @@ double difference(const Reach& c, const Reach& g, const Reach& d, const Reach& h
     return std::max(c.high - g.low - d.low + h.high, d.high - h.low - c.low + g.high);
 }
 
+// The most light that matter of a colour sends: both sums of lights are limited to one.
+double brightest_lit(const ShadingSettings& s, double color) {
+    if (s.model == ShadingModel::gooch) return 1;
+    return color * std::min(s.ka + s.kd, 1.0) + std::min(s.ks, 1.0);
+}
+
 }  // namespace
 
 BoundedRay::BoundedRay(const Plan& plan) : s_(plan.compositing) {
     const double alpha_bits = std::ldexp(1.0, -s_.alpha_fraction);
     alpha_unit_ = alpha_bits;
-    const int color =
-        s_.premultiplied ? s_.color_fraction : plan.specs[Wire::slab_ratio].format.fraction_bits;
-    color_unit_ = std::ldexp(1.0, -color);
+    const Wire color = plan.lit ? Wire::lit_color : s_.premultiplied ? Wire::slab_color : Wire::slab_ratio;
+    color_unit_ = std::ldexp(1.0, -plan.specs[color].format.fraction_bits);
     for (const Entry& entry : plan.entries.entry)
         brightest_ = std::max({brightest_, entry.color.x, entry.color.y, entry.color.z});
+    if (plan.lit) brightest_ = brightest_lit(plan.scene.shading, brightest_);
 }
 
 void BoundedRay::composited(const Slab<Bounded>& slab, const Accumulated<Bounded>& before,
                             const Accumulated<Bounded>& after) {
     Seen seen{{}, in_double(slab.alpha.v) * alpha_unit_, clear(before), clear(after), {}};
     bool changed = seen.alpha != 0 || !slab.alpha.exact || seen.clear_before != seen.clear_after;
+    const double unit = 1 / static_cast<double>(s_.color_unit());
+    const bool divided = s_.form == CompositingForm::straight;  // C is, by its opacity
+    const double of_before = unit * (divided ? 1 - seen.clear_before : 1),
+                 of_after = unit * (divided ? 1 - seen.clear_after : 1);
     for (std::size_t c = 0; c < 3; ++c) {
-        const double unit = 1 / static_cast<double>(s_.color_unit());
-        seen.color[c] = {in_double(slab.color[c].v) * color_unit_, in_double(before.color[c].v) * unit,
-                         in_double(after.color[c].v) * unit, slab.color[c].error.scaled(color_unit_)};
+        seen.color[c] = {in_double(slab.color[c].v) * color_unit_, in_double(before.color[c].v) * of_before,
+                         in_double(after.color[c].v) * of_after, slab.color[c].error.scaled(color_unit_)};
         changed = changed || before.color[c].v != after.color[c].v;
     }
     if (!changed) return;
@@ -84,9 +93,16 @@ Reach BoundedRay::colors(const Seen& k, std::size_t c) const {
     const double off = k.color[c].error.sum();
     return {std::max(k.color[c].value - off, 0.0), std::min(k.color[c].value + off, brightest_)};
 }
+// Whether a channel's slabs bring c alpha, and not c.
+bool BoundedRay::is_premultiplied(std::size_t c) const {
+    return s_.premultiplied && c < 3;
+}
 // G_k from G_(k+1): G is linear in alpha, and rises with c and what lies behind.
 Reach BoundedRay::gathered(const Seen& k, std::size_t c, const Reach& behind) const {
     const Reach alpha = opacities(k), color = colors(k, c);
+    if (is_premultiplied(c))
+        return {color.low + (1 - alpha.high) * behind.low,
+                std::min(color.high + (1 - alpha.low) * behind.high, brightest_)};
     const auto at = [](double a, double color_, double g) { return g + a * (color_ - g); };
     return {std::min(at(alpha.low, color.low, behind.low), at(alpha.high, color.low, behind.low)),
             std::max(at(alpha.low, color.high, behind.high), at(alpha.high, color.high, behind.high))};
@@ -104,8 +120,9 @@ double BoundedRay::add_step(Shares& shares, const Seen& k, std::size_t c, const 
     const double value = is_color ? k.color[c].value : 1;
     const double gained = is_color ? k.color[c].after - k.color[c].before : k.clear_before - k.clear_after;
     double lambda = k.clear_after - k.clear_before * (1 - k.alpha);
-    double kappa = gained - k.clear_before * k.alpha * value, carried = 0;
-    if (carries()) carried = -lambda, kappa -= carried * value, lambda = 0;
+    const bool premultiplied = is_premultiplied(c);
+    double kappa = gained - k.clear_before * (premultiplied ? 1 : k.alpha) * value, carried = 0;
+    if (carries()) carried = -lambda, kappa -= premultiplied ? 0 : carried * value, lambda = 0;
     const double known = std::max(told(kappa + lambda * behind.low), told(kappa + lambda * behind.high));
     const double of_color = is_color ? unit_of(s_.to_color) * bit(s_.sum_fraction) : 0,
                  of_clear =
@@ -149,13 +166,15 @@ void BoundedRay::from_the_back(std::array<Shares, 4>& all, bool stopped) {
         std::optional<std::pair<Reach, Reach>> farther;
         for (std::size_t i = slabs_.size(); i-- > 0;) {
             const Seen& k = slabs_[i];
-            const Reach color = colors(k, c);
+            // What an error of alpha brings in place of what lies behind: nothing, where colours have it in them.
+            const bool premultiplied = is_premultiplied(c);
+            const Reach color = premultiplied ? Reach{} : colors(k, c);
             const double apart = std::max(color.high - behind.low, behind.high - color.low);
             // The ray without rounding may have ended here, this one went on.
             if (threshold > 0 && k.clear_after - k.clear_off < threshold && k.clear_after >= threshold)
                 ended = std::max(ended, threshold * behind.high);
             shares.add(k.alpha_error, k.clear_before * apart);
-            if (c < 3) shares.add(k.color[c].error, k.clear_before * k.alpha);
+            if (c < 3) shares.add(k.color[c].error, k.clear_before * (premultiplied ? 1 : k.alpha));
             if (const double carried = add_step(shares, k, c, behind, apart); carried != 0) {
                 each += std::abs(carried) * apart;
                 if (farther)
@@ -181,12 +200,13 @@ void BoundedRay::from_the_front(std::array<Shares, 4>& all) {
             const double before = c == 3 ? 1 - k.clear_before : k.color[c].before,
                          after = c == 3 ? 1 - k.clear_after : k.color[c].after,
                          value = c == 3 ? 1 : k.color[c].value;
-            const Reach color = colors(k, c);
+            const bool premultiplied = is_premultiplied(c);
+            const Reach color = premultiplied ? Reach{} : colors(k, c);
             Shares& shares = all[c];
             shares.add(k.alpha_error,
                        in_front * std::max(std::abs(color.high - before), std::abs(color.low - before)));
-            if (c < 3) shares.add(k.color[c].error, in_front * k.alpha);
-            const double kappa = after - before * (1 - k.alpha) - value * k.alpha;
+            if (c < 3) shares.add(k.color[c].error, in_front * (premultiplied ? 1 : k.alpha));
+            const double kappa = after - before * (1 - k.alpha) - value * (premultiplied ? 1 : k.alpha);
             if (std::abs(kappa) >= 0x1p-46)
                 add_local(shares, in_front * std::abs(kappa),
                           {{c == 3 ? index_of(Wire::transparency) : index_of(Wire::color), 0.0}});

@@ -42,6 +42,7 @@ class BoundedRay : public Silent {
     static Reach opacities(const Seen& k);
     Reach colors(const Seen& k, std::size_t c) const;
     Reach gathered(const Seen& k, std::size_t c, const Reach& behind) const;
+    bool is_premultiplied(std::size_t c) const;
     bool carries() const;
     double add_step(Shares& shares, const Seen& k, std::size_t c, const Reach& behind, double apart) const;
     void from_the_back(std::array<Shares, 4>& all, bool stopped);

@@ -2,7 +2,9 @@
 // includes this runs it.
 #pragma once
 
+#include "pipeline/machines/certificate/light.h"
 #include "pipeline/machines/certificate/payers.h"
+#include "pipeline/machines/certificate/reached.h"
 #include "pipeline/stages/ray_setup-inl.h"
 
 #include "pipeline/classification/entries-inl.h"
@@ -56,21 +58,20 @@ struct BoundedCell {
         const Index3& d = volume.dims;
         return volume.at(std::min(x, d.x - 1), std::min(y, d.y - 1), std::min(z, d.z - 1));
     }
-    /// The steepest edges of the cells [low, high] along each axis, levels a voxel.
-    std::array<double, 3> slopes(const std::array<std::int64_t, 3>& low,
-                                 const std::array<std::int64_t, 3>& high) const {
+    /// The steepest edges of cells along each axis, levels a voxel.
+    std::array<double, 3> slopes(const ReachedCells& cells) const {
         std::array<double, 3> steepest{};
-        for (std::int64_t z = low[2]; z <= high[2] + 1; ++z)
-            for (std::int64_t y = low[1]; y <= high[1] + 1; ++y)
-                for (std::int64_t x = low[0]; x <= high[0] + 1; ++x) {
-                    const std::int64_t here = voxel(x, y, z);
-                    const auto take = [&](std::size_t axis, std::int64_t next) {
-                        steepest[axis] = std::max(steepest[axis], std::abs(static_cast<double>(next - here)));
-                    };
-                    if (x <= high[0]) take(0, voxel(x + 1, y, z));
-                    if (y <= high[1]) take(1, voxel(x, y + 1, z));
-                    if (z <= high[2]) take(2, voxel(x, y, z + 1));
-                }
+        const auto range = static_cast<double>(volume.largest - volume.smallest);
+        if (cells.far) return {range, range, range};
+        cells.corners([&](const std::array<std::int64_t, 3>& p) {
+            const std::int64_t here = voxel(p[0], p[1], p[2]);
+            const auto take = [&](std::size_t axis, std::int64_t next) {
+                steepest[axis] = std::max(steepest[axis], std::abs(static_cast<double>(next - here)));
+            };
+            if (p[0] <= cells.high[0]) take(0, voxel(p[0] + 1, p[1], p[2]));
+            if (p[1] <= cells.high[1]) take(1, voxel(p[0], p[1] + 1, p[2]));
+            if (p[2] <= cells.high[2]) take(2, voxel(p[0], p[1], p[2] + 1));
+        });
         return steepest;
     }
 };
@@ -87,12 +88,46 @@ struct BoundedVolume {
     W nears_wall(const WallStage& walls, const std::array<W, 3>& at) const;
 };
 
+/// The voxel nearest to a point, and all those that its location's error may make the nearest.
+inline Bounded nearest_of(const InterpolationStage& s, const BoundedCell& cell,
+                          const std::array<Bounded, 3>& weight, Int128 word) {
+    const double whole = std::ldexp(1.0, s.weight_bits), one = std::ldexp(1.0, s.sample_fraction);
+    std::array<std::int64_t, 3> low{}, high{};
+    double all = 0;
+    bool far = false;
+    for (std::size_t a = 0; a < 3; ++a) {
+        const double place = in_double(weight[a].v) / whole + 0.5, off = weight[a].most() / whole;
+        all += weight[a].most(), far = far || !(off < 4);
+        if (far) break;
+        low[a] = cell.at[a] + static_cast<std::int64_t>(std::floor(place - off * (1 + 1e-9)));
+        high[a] = cell.at[a] + static_cast<std::int64_t>(std::floor(place + off * (1 + 1e-9)));
+    }
+    double most = static_cast<double>(cell.volume.largest - cell.volume.smallest) * one;
+    if (!far) {
+        most = 0;
+        for (std::int64_t z = low[2]; z <= high[2]; ++z)
+            for (std::int64_t y = low[1]; y <= high[1]; ++y)
+                for (std::int64_t x = low[0]; x <= high[0]; ++x) {
+                    const auto value = static_cast<double>(cell.voxel(std::max<std::int64_t>(x, 0),
+                                                                      std::max<std::int64_t>(y, 0),
+                                                                      std::max<std::int64_t>(z, 0)));
+                    most = std::max(most, std::abs(value * one - in_double(word)));
+                }
+    }
+    Shares error;
+    if (most > 0 && all > 0)
+        for (const Bounded& w : weight)
+            if (!w.exact) error.add(w.error, most / all);
+    return with_error(word, std::isfinite(all) ? error : Shares::one(-1, most));
+}
+
 /// Lerps are contractions in their values, so what the point is displaced by counts with the steepest edges of the cells
 /// that it can reach, and every level's own rounding once.
 inline Bounded interpolate(const InterpolationStage& s, const BoundedCell& cell,
                            const std::array<Bounded, 3>& weight) {
     const Int128 word = HWY_NAMESPACE::interpolate(
         s, cell.corners, std::array<Int128, 3>{weight[0].v, weight[1].v, weight[2].v});
+    if (s.nearest) return nearest_of(s, cell, weight, word);
     // What the three levels have taken: none of them can be told from the others.
     const int bits = s.weight_bits;
     const long double part = std::ldexp(1.0L, -bits);
@@ -117,23 +152,8 @@ inline Bounded interpolate(const InterpolationStage& s, const BoundedCell& cell,
                {index_of(Wire::sample), unit_of(s.to_sample)}});
     if (weight[0].exact && weight[1].exact && weight[2].exact) return with_error(word, error);
 
-    std::array<std::int64_t, 3> low{}, high{};
     const double whole = std::ldexp(1.0, bits);
-    bool far = false;
-    for (std::size_t a = 0; a < 3; ++a) {
-        const double place = in_double(weight[a].v) / whole, off = weight[a].most() / whole * (1 + 1e-9);
-        const std::int64_t last = std::max<std::int64_t>(cell.volume.dims[static_cast<int>(a)] - 2, 0);
-        far = far || !(off < 4);
-        const auto reached = [&](double p) {
-            return std::clamp<std::int64_t>(cell.at[a] + static_cast<std::int64_t>(std::floor(p)), 0, last);
-        };
-        if (far) continue;
-        low[a] = reached(place - off);
-        high[a] = std::max(low[a], reached(std::ceil(place + off) - 1));
-    }
-    const auto range = static_cast<double>(cell.volume.largest - cell.volume.smallest);
-    const std::array<double, 3> slope =
-        far ? std::array<double, 3>{range, range, range} : cell.slopes(low, high);
+    const std::array<double, 3> slope = cell.slopes(reached_cells(cell.volume, cell.at, weight, bits));
     for (std::size_t a = 0; a < 3; ++a)
         if (slope[a] > 0) error.add(weight[a].error, slope[a] * one / whole);
     return with_error(word, error);
@@ -178,12 +198,15 @@ inline BoundedCell BoundedVolume::cell(const std::array<Bounded, 3>& at) const {
     const HWY_NAMESPACE::FromVolume voxels{volume};
     return {volume, place, voxels.cell(std::array<Int128, 3>{at[0].v, at[1].v, at[2].v})};
 }
-// Lit scenes are not bounded yet: a word that nothing is known of.
 template <class W>
-auto BoundedVolume::neighbourhood(const std::array<W, 3>&) const {
-    HWY_NAMESPACE::Neighbourhood<W> none;
-    none.voxel.fill(unbounded(0));
-    return none;
+auto BoundedVolume::neighbourhood(const std::array<W, 3>& at) const {
+    const HWY_NAMESPACE::FromVolume voxels{volume};
+    const std::array<Int128, 3> cell{at[0].v, at[1].v, at[2].v};
+    return HWY_NAMESPACE::Neighbourhood<W>{
+        &volume,
+        {static_cast<std::int64_t>(cell[0]), static_cast<std::int64_t>(cell[1]),
+         static_cast<std::int64_t>(cell[2])},
+        voxels.neighbourhood(cell)};
 }
 
 // Nor are slabs looked at twice.
