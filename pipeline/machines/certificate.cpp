@@ -55,15 +55,18 @@ void certify_row(const Plan& plan, const M& bounded_method, int row, const Certi
         ++part.rays;
         double most = 0;
         std::array<bool, kDoubtNames.size()> doubts{};
+        Shares ray_greatest, ray_shares;
         for (std::size_t c = 0; c < 4; ++c) {
             const Shares lsb8 = bound[c].scaled(255);
             const double sum = lsb8.sum();
-            most = std::max(most, sum);
+            if (sum > most) most = sum, ray_shares = lsb8;
+            ray_greatest = greatest(ray_greatest, lsb8);
             constexpr std::array<int, kDoubtNames.size()> kDoubtful{kWallsPay, kTerminationPays,
                                                                     kGradientsPay};
             for (std::size_t d = 0; d < doubts.size(); ++d)
-                doubts[d] = doubts[d] || lsb8[kDoubtful[d]] > kUndecided;
-            part.greatest = greatest(part.greatest, lsb8);
+                doubts[d] =
+                    doubts[d] ||
+                    lsb8[kDoubtful[d]] > (kDoubtful[d] == kTerminationPays ? kUndecided : options.undecided);
             if (sum > part.most)
                 part.most = sum, part.shares = lsb8, part.column = column, part.row = row,
                 part.channel = static_cast<int>(c);
@@ -78,10 +81,13 @@ void certify_row(const Plan& plan, const M& bounded_method, int row, const Certi
             }
         }
         for (std::size_t d = 0; d < doubts.size(); ++d) part.undecided[d] += doubts[d];
-        if (std::find(doubts.begin(), doubts.end(), true) != doubts.end())
+        part.greatest = greatest(part.greatest, ray_greatest);
+        if (std::find(doubts.begin(), doubts.end(), true) != doubts.end()) {
             ++part.undecided_rays;
-        else
-            part.most_decided = std::max(part.most_decided, most);
+        } else {
+            part.greatest_decided = greatest(part.greatest_decided, ray_greatest);
+            if (most > part.most_decided) part.most_decided = most, part.shares_decided = ray_shares;
+        }
         to.most.push_back(static_cast<float>(most));
     }
 }
@@ -210,7 +216,9 @@ Certificate certify(const Plan& plan, const CertificateOptions& options) {
         if (part.most > all.most)
             all.most = part.most, all.shares = part.shares, all.column = part.column, all.row = part.row,
             all.channel = part.channel;
-        all.most_decided = std::max(all.most_decided, part.most_decided);
+        if (part.most_decided > all.most_decided)
+            all.most_decided = part.most_decided, all.shares_decided = part.shares_decided;
+        all.greatest_decided = greatest(all.greatest_decided, part.greatest_decided);
         all.greatest = greatest(all.greatest, part.greatest);
         for (std::size_t d = 0; d < all.undecided.size(); ++d) all.undecided[d] += part.undecided[d];
         all.undecided_rays += part.undecided_rays;

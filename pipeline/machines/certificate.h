@@ -45,10 +45,11 @@ inline constexpr std::array<std::string_view, 3> kDoubtNames{"wall", "terminatio
 inline constexpr double kUndecided = 0.5;  // LSB8
 
 struct CertificateOptions {
-    int threads = 0;        // 0: one a processor
-    bool channels = false;  // keep the bound of every pixel
-    int payer = -1;         // of the bound of every pixel only this one's share
-    int every = 1;          // rows and columns: the first of so many
+    int threads = 0;                // 0: one a processor
+    bool channels = false;          // keep the bound of every pixel
+    int payer = -1;                 // of the bound of every pixel only this one's share
+    int every = 1;                  // rows and columns: the first of so many
+    double undecided = kUndecided;  // of walls and gradients, LSB8
     const std::atomic<bool>* cancelled = nullptr;
 };
 
@@ -57,6 +58,8 @@ struct Certificate {
     std::int64_t rays = 0;                 // that meet the volume
     double most = 0, median = 0;           // the greatest of R, G, B and A, over the rays
     double most_decided = 0;               // over the rays that are not undecided
+    Shares shares_decided;                 // of `most_decided`
+    Shares greatest_decided;               // of each cause alone, over those rays
     int column = 0, row = 0, channel = 0;  // of `most`
     Shares shares;                         // of `most`
     Shares greatest;                       // of each cause alone, over all pixels and channels
