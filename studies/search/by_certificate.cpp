@@ -6,6 +6,7 @@
 #include "pipeline/record.h"
 #include "pipeline/render.h"
 #include "scene/toml.h"
+#include "studies/search/by_shares.h"
 #include "studies/sweep/cost.h"
 #include "studies/sweep/run_folder.h"
 
@@ -22,7 +23,6 @@ namespace {
 
 using sweep::Json;
 using sweep::WireEdit;
-using Bits = std::map<Wire, int>;  // of the fraction
 
 sweep::SweepFile sweep_of(const Settings& settings) {
     sweep::SweepFile sweep;
@@ -40,11 +40,16 @@ class ByCertificate {
         sweep::make_run_folder(s_.folder);
         const std::string file = s_.folder + "/formats.toml", record = s_.folder + "/search.json";
         for (const std::string& old : {file, record}) std::filesystem::remove(old);
-        result_.scene = proven(own_, certificates(own_));
+        const Pictures all = pictures();
+        result_.scene = proven(own_, prove(all, own_));
         Bits bits = own_;
-        if (!reach(bits)) return std::move(result_);
-        take_back(bits);
-        result_.found = proven(bits, certificates(bits));
+        Proof proof;
+        if (!reach(all, s_.most_error, kMostRaises, bits, proof)) {
+            fail(proof);
+            return std::move(result_);
+        }
+        take_back(all, s_.most_error, kRounds, bits, proof);
+        result_.found = proven(bits, proof);
         for (Proven* p : {&result_.scene, &result_.found})
             p->error = measured(p == &result_.found ? bits : own_);
         result_.formats_file = file;
@@ -104,37 +109,6 @@ class ByCertificate {
         for (int view = 0; view < s_.views; ++view) result_.degrees.push_back(360.0 * view / s_.views);
     }
 
-    struct Proof {
-        double most = 0;
-        Shares greatest, worst;  // over all pictures; of the pixel with the greatest bound
-        std::int64_t rays = 0, undecided = 0;
-        double share(Wire wire) const { return greatest[static_cast<int>(wire)]; }
-        /// What no wire's bits can take away.
-        double fixed() const {
-            double sum = greatest[Shares::kElsewhere];
-            for (int p = kWires; p < kPayers; ++p) sum += greatest[p];
-            return sum;
-        }
-    };
-    Proof certificates(const Bits& bits) {
-        Proof proof;
-        for (std::size_t scene = 0; scene < scenes(); ++scene)
-            for (int view = 0; view < s_.views; ++view) {
-                const Certificate c =
-                    certify(plan_of(scene, bits, view), {.threads = s_.threads, .cancelled = s_.cancelled});
-                if (c.most > proof.most) proof.most = c.most, proof.worst = c.shares;
-                proof.greatest = greatest(proof.greatest, c.greatest);
-                proof.rays += c.rays, proof.undecided += c.undecided_rays;
-                ++result_.certificates;
-            }
-        for (const Wire wire : result_.wires)
-            if (proof.worst[static_cast<int>(wire)] > proof.worst[static_cast<int>(result_.binding)])
-                result_.binding = wire;
-        if (s_.progress)
-            s_.progress(fmt::format("{} certificates; bound {:.4g} of {:.4g} LSB8", result_.certificates,
-                                    proof.most, s_.most_error));
-        return proof;
-    }
     // The tally's figure, or none where no word holds these.
     double cost(const Bits& bits) {
         double sum = 0;
@@ -146,97 +120,37 @@ class ByCertificate {
         return {plan_of(0, bits, 0).specs, cost(bits), proof.most, 0, proof.rays, proof.undecided};
     }
 
-    static constexpr int kRounds = 4, kMostRaises = 64;
+    static constexpr int kMostRaises = 64, kRounds = 8;
 
-    /// Equal shares, until the bound holds; then the greatest payer's bits one by one.
-    bool reach(Bits& bits) {
-        Proof proof = certificates(bits);
-        for (int round = 0; round < kRounds; ++round) {
-            // Walls, rows and termination need not meet in one pixel.
-            const double left = std::max(s_.most_error - proof.fixed(), s_.most_error / 8);
-            int payers = 0;
-            for (const auto& item : bits) payers += proof.share(item.first) > 0;
-            bool changed = false;
-            for (auto& [wire, fraction] : bits) {
-                if (!(proof.share(wire) > 0)) continue;
-                const int more = static_cast<int>(std::ceil(std::log2(payers * proof.share(wire) / left)));
-                const int wanted = std::clamp(fraction + more, 1, kMostChosenFractionBits);
-                changed = changed || wanted != fraction, fraction = wanted;
-            }
-            if (!changed) break;
-            proof = certificates(bits);
-            if (proof.most <= s_.most_error) return true;
-        }
-        for (int raise = 0; raise < kMostRaises; ++raise) {
-            if (proof.most <= s_.most_error) return true;
-            int* best = nullptr;
-            double most = 0;
-            for (auto& [wire, fraction] : bits)
-                if (fraction < kMostChosenFractionBits && proof.worst[static_cast<int>(wire)] > most)
-                    best = &fraction, most = proof.worst[static_cast<int>(wire)];
-            if (!best) break;
-            ++*best, proof = certificates(bits);
-        }
-        return proof.most <= s_.most_error || fails(proof);
+    Pictures pictures() {
+        Pictures all;
+        all.count = result_.pictures;
+        const auto views = static_cast<std::size_t>(s_.views);
+        all.plan = [this, views](const Bits& bits, std::size_t i) {
+            return plan_of(i / views, bits, static_cast<int>(i % views));
+        };
+        all.cost = [this](const Bits& bits) { return cost(bits); };
+        all.least = least_bits(plan_of(0, {}, 0));
+        all.certificate = {.threads = s_.threads, .cancelled = s_.cancelled};
+        all.proven = [this](const Proof& proof) {
+            result_.certificates += result_.pictures;
+            for (const Wire wire : result_.wires)
+                if (proof.worst[static_cast<int>(wire)] > proof.worst[static_cast<int>(result_.binding)])
+                    result_.binding = wire;
+            if (s_.progress)
+                s_.progress(fmt::format("{} certificates; bound {:.4g} of {:.4g} LSB8", result_.certificates,
+                                        proof.most, s_.most_error));
+        };
+        return all;
     }
-    bool fails(const Proof& proof) {
-        int binding = static_cast<int>(result_.binding);
-        for (int p = 0; p < Shares::kMost; ++p)
-            if (proof.worst[p] > proof.worst[binding]) binding = p;
+    void fail(const Proof& proof) {
+        const int binding = proof.binding();
         result_.failure = fmt::format(
             "--max-error: found {:g}, but the nearest formats have a bound of {:.4g} LSB8, of which {} makes "
             "{:.4g}{}; "
             "allowed: more than that",
             s_.most_error, proof.most, payer_name(binding), proof.worst[binding],
             binding == kTerminationPays ? " (sampling.termination, 2^-10 of 255 is 0.25)" : "");
-        return false;
-    }
-
-    /// A bit of every wire whose share may double, the dearest for its share first, while certificates allow.
-    void take_back(Bits& bits) {
-        Proof proof = certificates(bits);
-        std::set<Wire> refused;
-        for (int round = 0; round < 2 * kRounds; ++round) {
-            const double now = cost(bits);
-            struct Candidate {
-                Wire wire;
-                double share, saves;
-            };
-            std::vector<Candidate> candidates;
-            for (const auto& [wire, fraction] : bits) {
-                if (fraction < 2 || refused.contains(wire)) continue;
-                Bits fewer = bits;
-                --fewer[wire];
-                try {
-                    if (const double saves = now - cost(fewer); saves > 0)
-                        candidates.push_back({wire, std::max(proof.share(wire), 1e-6), saves});
-                } catch (const InputError&) {
-                    refused.insert(wire);
-                }
-            }
-            std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
-                return a.saves / a.share > b.saves / b.share;
-            });
-            double left = s_.most_error - proof.most;
-            std::vector<Wire> taken;
-            for (const Candidate& c : candidates)
-                if (c.share <= left) left -= c.share, taken.push_back(c.wire);
-            if (taken.empty()) return;
-            for (;;) {
-                Bits fewer = bits;
-                for (const Wire wire : taken) --fewer[wire];
-                const Proof tried = certificates(fewer);
-                if (tried.most <= s_.most_error) {
-                    bits = fewer, proof = tried;
-                    break;
-                }
-                // A wire that was exact in these pictures is not any more.
-                for (const Wire wire : taken)
-                    if (taken.size() == 1 || tried.share(wire) > 4 * proof.share(wire)) refused.insert(wire);
-                taken.resize(taken.size() / 2);
-                if (taken.empty()) break;
-            }
-        }
     }
 
     double measured(const Bits& bits) {

@@ -1,13 +1,7 @@
 // squint search --guarantee pictures: formats under whose roundings no pixel of given pictures can err by more than a
 // bound, by certificates (pipeline/machines/certificate.h) and not by trying.
 //
-// A bit more on a wire halves its share of a bound.  For n causes the fewest bits, where all bits cost alike,
-// give each an equal share of what walls, termination and tables leave of the bound:
-//
-//     F' = F + ceil(log2(n share / left)),
-//
-// from each wire's greatest share over all pixels.  Then bits that the tally says are dear are taken back,
-// where the certificates do not need them.
+// How: studies/search/by_shares.h.
 #pragma once
 
 #include "studies/search/search.h"
