@@ -7,6 +7,7 @@
 #include "core/text.h"
 #include "core/volume_source.h"
 #include "scene/from_data.h"
+#include "studies/search/auto_formats.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -74,18 +75,25 @@ std::shared_ptr<const Volume> load(const Scene& scene, std::vector<std::string>&
 }
 
 std::shared_ptr<const Volume> load_and_complete(const SceneArguments& arguments, Scene& scene,
-                                                std::vector<std::string>& notes, std::int64_t max_bytes) {
+                                                std::vector<std::string>& notes,
+                                                std::vector<std::string>& warnings, std::int64_t max_bytes) {
     auto volume = load(scene, notes, max_bytes);
     complete_from_data(scene, *volume, notes);
     if (is_of_data(file_of(arguments.file), arguments.overrides)) frame_data(scene, *volume);
+    const Interruptible here;
+    const search::AutoFormats chosen =
+        search::choose_formats(scene, volume, {.threads = 0, .cancelled = &interrupted});
+    notes.insert(notes.end(), chosen.notes.begin(), chosen.notes.end());
+    warnings.insert(warnings.end(), chosen.warnings.begin(), chosen.warnings.end());
     return volume;
 }
 
 Plan plan_of(const SceneArguments& arguments) {
     Scene scene = read(arguments);
-    std::vector<std::string> notes;
-    const auto volume = load_and_complete(arguments, scene, notes);
+    std::vector<std::string> notes, warnings;
+    const auto volume = load_and_complete(arguments, scene, notes, warnings);
     Plan plan = plan_asked_for(scene, volume);
+    plan.warnings.insert(plan.warnings.begin(), warnings.begin(), warnings.end());
     plan.notes.insert(plan.notes.begin(), notes.begin(), notes.end());
     return plan;
 }

@@ -36,9 +36,11 @@ Scene scene_of_volume(const std::string& name_or_file, const std::vector<std::st
 
 /// Loads the scene's volume, and refuses one beyond `max_bytes` (0: no limit).  A scene without a transfer
 /// function gets the data's own; where the arguments name a volume in place of a scene, the camera frames what it
-/// shows.
+/// shows.  The preset `auto` gets its formats; `warnings` hears where its budget is not met.
 std::shared_ptr<const Volume> load_and_complete(const SceneArguments& arguments, Scene& scene,
-                                                std::vector<std::string>& notes, std::int64_t max_bytes = 0);
+                                                std::vector<std::string>& notes,
+                                                std::vector<std::string>& warnings,
+                                                std::int64_t max_bytes = 0);
 
 /// Loads the scene's volume, at most `max_bytes` (0: no limit).  `notes` receives what a user should know.
 std::shared_ptr<const Volume> load(const Scene& scene, std::vector<std::string>& notes,

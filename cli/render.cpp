@@ -196,7 +196,8 @@ struct Job {
     const RenderArguments& arguments;
     Scene scene;
     std::shared_ptr<const Volume> volume;
-    std::string output, preview;  // EXR as asked for, or the default; PNG or JPEG
+    std::string output, preview;        // EXR as asked for, or the default; PNG or JPEG
+    std::vector<std::string> warnings;  // of all pictures
 };
 
 /// Writes the exact integral with the scene in its attributes, but no formats: it has none.
@@ -262,7 +263,8 @@ Json render_frame(const Job& job, int frame) {
         write_preview(rendering.image, png, background);
     }
     const bool measured = a.error || a.reference;
-    const std::vector<std::string> warnings = warnings_of(plan, rendering);
+    std::vector<std::string> warnings = warnings_of(plan, rendering);
+    warnings.insert(warnings.begin(), job.warnings.begin(), job.warnings.end());
     if (!a.quiet) {
         const RenderStatistics& s = rendering.statistics;
         say(fmt::format("{}: {}x{} pixels, {} ({}), {:.2f} s, {} samples on {} rays, {} thread{}\n",
@@ -320,8 +322,8 @@ int run(const RenderArguments& a) {
 
     Scene scene = read(a.scene);
     if (a.print_scene) {
-        std::vector<std::string> unread;
-        load_and_complete(a.scene, scene, unread, a.max_memory);
+        std::vector<std::string> unread, warnings;
+        load_and_complete(a.scene, scene, unread, warnings, a.max_memory);
         return print(to_toml(scene)), kDone;
     }
     if (a.options.audit && rounds_nothing(scene.precision.preset))
@@ -330,9 +332,9 @@ int run(const RenderArguments& a) {
             scene.precision.preset));
     refuse_beyond(a.max_memory, image_bytes(scene),
                   fmt::format("a picture of {}x{} pixels", scene.image.width, scene.image.height));
-    std::vector<std::string> notes;
-    const auto volume = load_and_complete(a.scene, scene, notes, a.max_memory);
-    const Job job{a, scene, volume, output, preview};
+    std::vector<std::string> notes, of_formats;
+    const auto volume = load_and_complete(a.scene, scene, notes, of_formats, a.max_memory);
+    const Job job{a, scene, volume, output, preview, of_formats};
     if (!a.quiet)
         for (const std::string& note : notes) say(fmt::format("  note: {}\n", message_text(note)));
 

@@ -11,6 +11,7 @@
 #include "scene/presets.h"
 #include "scene/shelf.h"
 #include "scene/toml.h"
+#include "studies/search/auto_formats.h"
 #include "studies/sweep/report.h"
 #include "studies/sweep/run.h"
 #include "truth/reference.h"
@@ -162,6 +163,9 @@ Loaded load(const Input& input) {
                                               : load_volume(source, {}, &loaded.notes));
     complete_from_data(loaded.scene, *loaded.volume, loaded.notes);
     if (of_data) frame_data(loaded.scene, *loaded.volume);
+    const search::AutoFormats chosen = search::choose_formats(loaded.scene, loaded.volume);
+    for (const auto* texts : {&chosen.notes, &chosen.warnings})
+        loaded.notes.insert(loaded.notes.end(), texts->begin(), texts->end());
     return loaded;
 }
 

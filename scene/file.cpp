@@ -488,6 +488,7 @@ PrecisionSettings resolved_precision(const Scene& scene) {
             fmt::format("{}: precision.preset: found {}; allowed in a preset file: a built-in preset", path,
                         in_quotes(under.precision.preset)));
     precision.preset = under.precision.preset;
+    if (!scene.given_at.contains("precision.budget")) precision.budget = under.precision.budget;
     for (std::size_t i = 0; i < precision.override_.size(); ++i)
         precision.override_[i] = merged(under.precision.override_[i], precision.override_[i]);
     return precision;

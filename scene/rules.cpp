@@ -42,6 +42,7 @@ constexpr Limits kLimits[] = {
     {"shading.warm_share", 0, 1},
     {"classification.order", 1, 5},
     {"classification.table_size", 64, 4096},
+    {"precision.budget", 0, kNone, true},
     {"lights.color", 0, 1},
 };
 constexpr Limits kNoLimits{""};

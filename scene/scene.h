@@ -50,6 +50,7 @@ enum class CompositingForm {
     straight
 };
 enum class CompositingMode { over, mip, minip, average };
+enum class Guarantee { pictures, scene };
 enum class LayoutRule { automatic, linear, cells };
 
 /// The names of an enumeration's values, in order.  Specialised below for each enumeration of a scene.
@@ -77,6 +78,7 @@ SQUINT_NAMES(PowerRule, "squaring", "parabola", "table");
 SQUINT_NAMES(CompositingForm, "auto", "w", "w_carry", "equation_9", "alpha", "back_to_front", "unit255_shift",
              "unit255_blinn", "straight");
 SQUINT_NAMES(CompositingMode, "over", "mip", "minip", "average");
+SQUINT_NAMES(Guarantee, "pictures", "scene");
 SQUINT_NAMES(LayoutRule, "auto", "linear", "cells");
 #undef SQUINT_NAMES
 
@@ -172,6 +174,8 @@ struct OutputSettings {
 
 struct PrecisionSettings {
     std::string preset = "default";  // one of kPrecisionPresets, or a file
+    double budget = 0.5;             // of `auto`, LSB8
+    Guarantee guarantee = Guarantee::pictures;
     std::array<std::optional<std::string>, kWires>
         override_;  // by wire: "u1.15 trn sat"; parts may be left out
 };
@@ -324,8 +328,14 @@ void visit_scene(S& scene, V&& visit) {
     visit("output.samples", scene.output.samples, "channel samples");
     visit("output.transparency", scene.output.transparency, "channel T");
     visit("output.fixed", scene.output.fixed, "channels fixed.R fixed.G fixed.B fixed.T: the raw words");
-    visit("precision.preset", scene.precision.preset,
-          "default, squeeze, eight_bit, volumepro, vizard2, ultravis, wide, real, float32 or a preset file");
+    visit(
+        "precision.preset", scene.precision.preset,
+        "default, squeeze, eight_bit, volumepro, vizard2, ultravis, wide, real, float32, auto (formats from "
+        "budget) or a preset file");
+    visit("precision.budget", scene.precision.budget,
+          "auto: the most that roundings may take from any pixel, LSB8, proven");
+    visit("precision.guarantee", scene.precision.guarantee,
+          "auto: what the bound is of: the pictures of the command, or every view of the scene (not yet)");
     for (int i = 0; i < kWires; ++i) {
         const auto& wire = kWireInfo[static_cast<std::size_t>(i)];
         visit("precision." + std::string(wire.name), scene.precision.override_[static_cast<std::size_t>(i)],
@@ -365,7 +375,7 @@ VolumeSource volume_source(const Scene& scene);
 
 /// The built-in precision presets.
 inline constexpr std::string_view kPrecisionPresets[] = {
-    "default", "squeeze", "eight_bit", "volumepro", "vizard2", "ultravis", "wide", "real", "float32"};
+    "default", "squeeze", "eight_bit", "volumepro", "vizard2", "ultravis", "wide", "real", "float32", "auto"};
 /// The precision settings with a preset file, where one is named, merged under the scene's own wires:
 /// `preset` is then a built-in one.  A preset file is TOML with one table, [precision]: a built-in `preset`,
 /// and wires. Throws InputError.

@@ -276,6 +276,11 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
     plan.projection_mode = scene.compositing.mode != CompositingMode::over;
     plan.lit = !scene.lights.empty() && scene.shading.model != ShadingModel::none && !plan.projection_mode;
     const PrecisionSettings precision = resolved_precision(scene);
+    if (precision.preset == "auto" && !has_all_formats(precision))
+        throw InputError(
+            "precision.preset: found \"auto\", whose formats are chosen for a command's own pictures; "
+            "allowed "
+            "here: another preset");
     plan.float32 = precision.preset == "float32";
     plan.real = rounds_nothing(precision.preset);
     plan.wants_depth = scene.output.depth;

@@ -18,7 +18,7 @@ std::vector<WireFormats> every_wire(const PresetInputs& in) {
 
 // The member of WireFormats for a preset; null if the name is unknown.
 Spec WireFormats::*preset_member(std::string_view name) {
-    if (name == "default") return &WireFormats::standard;
+    if (name == "default" || name == "auto") return &WireFormats::standard;
     for (const std::string_view like_squeeze : {"squeeze", "volumepro", "vizard2", "ultravis"})
         if (name == like_squeeze) return &WireFormats::squeeze;
     if (name == "eight_bit") return &WireFormats::eight_bit;

@@ -140,7 +140,7 @@ TEST(SceneFile, ListsTheNamesOfAnEnumeration) {
     EXPECT_EQ(refusal("[precision]\npreset = 'fast'\n"),
               "s.toml:5:10: precision.preset: found \"fast\"; allowed: default, squeeze, eight_bit, "
               "volumepro, vizard2, ultravis, wide, "
-              "real or float32, or the path of "
+              "real, float32 or auto, or the path of "
               "a preset file");
 }
 
