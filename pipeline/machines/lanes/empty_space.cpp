@@ -107,6 +107,36 @@ void clear_corners(EmptySpace& space) {
     });
 }
 
+void find_spans(EmptySpace& space) {
+    const Index3 n = space.box.blocks;
+    const auto nx = static_cast<std::size_t>(n.x), count = static_cast<std::size_t>(n.x * n.y * n.z);
+    space.spans.reserve(count + 3);  // lanes read four bytes at any of them
+    space.spans.assign(count, 0);
+    tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
+        // Two bits of a block of a row: whether it, and whether it or the next, can be seen.
+        const auto see = [&](std::int64_t y, std::int64_t k, std::vector<std::uint8_t>& row) {
+            std::fill(row.begin(), row.end(), std::uint8_t{0});
+            if (y >= n.y || k >= n.z) return;
+            const std::uint8_t* distance = space.distance.data() + (k * n.y + y) * n.x;
+            for (std::size_t x = 0; x < nx; ++x) row[x] = distance[x] == 0 ? 3 : 0;
+            for (std::size_t x = 0; x + 1 < nx; ++x)
+                row[x] = static_cast<std::uint8_t>(row[x] | (row[x + 1] & 2));
+        };
+        std::vector<std::uint8_t> here(nx), above(nx), next_here(nx), next_above(nx);
+        see(0, z, above), see(0, z + 1, next_above);
+        for (std::int64_t y = 0; y < n.y; ++y) {
+            here.swap(above), next_here.swap(next_above);
+            see(y + 1, z, above), see(y + 1, z + 1, next_above);
+            std::uint8_t* spans = space.spans.data() + (z * n.y + y) * n.x;
+            for (std::size_t x = 0; x < nx; ++x) {
+                const int along_y = here[x] | above[x], along_z = here[x] | next_here[x];
+                spans[x] = static_cast<std::uint8_t>(here[x] | along_y << 2 | along_z << 4 |
+                                                     (along_y | along_z | next_above[x]) << 6);
+            }
+        }
+    });
+}
+
 // The range of each block and its 26 neighbours, axis by axis.
 void widen(BlockRanges& ranges) {
     const Index3 n = ranges.box.blocks;
@@ -205,6 +235,7 @@ EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, i
     space.visible_blocks = visible;
     spread(space.distance, n);
     clear_corners(space);
+    find_spans(space);
     return space;
 }
 

@@ -36,13 +36,16 @@ struct EmptySpace {
     std::vector<std::uint8_t> distance;
     Index3 corners{0, 0, 0};          // of the blocks: one more along each axis
     std::vector<std::uint8_t> clear;  // empty blocks about each corner on every side
+    // Of each block, x fastest: bit x + 2 y + 4 z says whether one of the blocks up to x, y, z further on can be
+    // seen.
+    std::vector<std::uint8_t> spans;
     std::int64_t visible_blocks = 0;
     std::uint8_t at(std::int64_t x, std::int64_t y, std::int64_t z) const {
         const Index3 &low = box.low, &n = box.blocks;
         return distance[static_cast<std::size_t>(((z - low.z) * n.y + y - low.y) * n.x + x - low.x)];
     }
     /// About how many bytes ranges and distances of these blocks take.
-    static std::int64_t bytes_for(const BlockBox& box) { return 6 * box.count(); }
+    static std::int64_t bytes_for(const BlockBox& box) { return 7 * box.count(); }
 };
 
 /// `reach`: how many blocks apart two neighbouring samples may be, where the method sees the range between

@@ -152,6 +152,8 @@ void set_course(const Plan& plan, const lanes::EmptySpace& empty, const lanes::R
     const auto blocks_for = [](float distance) {
         return distance < 250 ? static_cast<int>(std::ceil(distance)) : 256;
     };
+    constexpr float kWidest = 0.49F;
+    course.apart = reach + margin <= kWidest ? reach + margin : -1;
     course.enough = blocks_for(off);
     course.stride = static_cast<int>(stride);
     course.enough_of_stride = blocks_for(off + 0.5F * (stride - 1) * fastest);

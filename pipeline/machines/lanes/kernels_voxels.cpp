@@ -381,6 +381,43 @@ std::uint32_t seen_about(const lanes::EmptySpace& empty, const lanes::RayCourse&
     return seen;
 }
 
+/// The same of the blocks alone that samples of row `at[i]` may lie in: at most two along each axis.
+template <class At>
+std::uint32_t seen_within(const lanes::EmptySpace& empty, const lanes::RayCourse& course, At&& at) {
+    const hn::ScalableTag<float> df;
+    const hn::ScalableTag<Word> d;
+    const Index3& blocks = empty.box.blocks;
+    const auto apart = hn::Set(df, course.apart);
+    std::uint32_t seen = 0;
+    for (int lane = 0; lane < lanes::RayCourse::kWindow; lane += kLanes) {
+        const auto row = at(lane);
+        auto here = hn::Gt(hn::Zero(d), hn::Zero(d));
+        for (int beam = 0; beam < course.beams; ++beam) {
+            auto index = hn::Zero(d), span = hn::Set(d, 1);  // span: its bit of EmptySpace::spans
+            const auto along = [&](int a, auto further) HWY_ATTR {
+                const auto p =
+                    hn::MulAdd(row, hn::Set(df, course.step[beam][a]), hn::Set(df, course.first[beam][a]));
+                const auto most = hn::Set(df, static_cast<float>(blocks[a] - 1));
+                const auto block_at = [&](auto place) HWY_ATTR {  // floors, for no place is below zero
+                    return hn::ConvertTo(d, hn::Min(hn::Max(place, hn::Zero(df)), most));
+                };
+                const auto first = block_at(hn::Sub(p, apart)), last = block_at(hn::Add(p, apart));
+                index = hn::Add(hn::Mul(index, hn::Set(d, static_cast<Word>(blocks[a]))), first);
+                span = hn::IfThenElse(hn::Gt(last, first), further(span), span);
+            };
+            along(2, [](auto v) HWY_ATTR { return hn::ShiftLeft<4>(v); });
+            along(1, [](auto v) HWY_ATTR { return hn::ShiftLeft<2>(v); });
+            along(0, [](auto v) HWY_ATTR { return hn::ShiftLeft<1>(v); });
+            const auto spans = hn::GatherOffset(d, reinterpret_cast<const Word*>(empty.spans.data()), index);
+            here = hn::Or(here, hn::TestBit(spans, span));
+        }
+        std::uint8_t bits[8] = {};
+        hn::StoreMaskBits(d, here, bits);
+        seen |= static_cast<std::uint32_t>(bits[0] | bits[1] << 8) << lane;
+    }
+    return seen;
+}
+
 lanes::Rows visible_rows_of(const lanes::EmptySpace& empty, const lanes::RayPacket& rays, int k,
                             lanes::RayCourse& course) {
     constexpr int kWindow = lanes::RayCourse::kWindow;
@@ -394,7 +431,9 @@ lanes::Rows visible_rows_of(const lanes::EmptySpace& empty, const lanes::RayPack
     while (k < rays.most_slabs) {
         if (k + lanes::kSteps > course.window + kWindow) {
             course.window = k;
-            course.may_be_seen = seen_about(empty, course, course.enough, rows_from(k, 1, 0));
+            course.may_be_seen = course.apart >= 0
+                                     ? seen_within(empty, course, rows_from(k, 1, 0))
+                                     : seen_about(empty, course, course.enough, rows_from(k, 1, 0));
         }
         const std::uint32_t ahead = course.may_be_seen >> (k - course.window);
         const int skipped = ahead ? std::countr_zero(ahead) : 0;

@@ -51,6 +51,9 @@ struct RayCourse {
     static constexpr int kWindow = 16;  // rows examined together
     int beams;
     float first[kMostBeams][3], step[kMostBeams][3];  // in blocks, from the lowest corner of empty space
+    // How far samples may lie from their beam's course along any axis, in blocks, where they meet two blocks along
+    // it at most; else below zero.
+    float apart;
     int enough;                    // empty blocks that a beam needs around the corner nearest to its course
     int stride, enough_of_stride;  // in steps; the same for so many steps at once
     int window;                    // row r of those examined last is window + r:

@@ -58,6 +58,28 @@ TEST(EmptySpace, ABlocksDistanceIsThatOfTheNearestVisibleOne) {
     }
 }
 
+TEST(EmptySpace, ASpanIsSeenWhereOneOfItsBlocksIs) {
+    std::mt19937 random(3);
+    for (int round = 0; round < 200; ++round) {
+        const Drawn drawn = draw(random);
+        const Index3 low = drawn.space.box.low, n = drawn.space.box.blocks;
+        std::size_t i = 0;
+        for (std::int64_t z = 0; z < n.z; ++z)
+            for (std::int64_t y = 0; y < n.y; ++y)
+                for (std::int64_t x = 0; x < n.x; ++x, ++i)
+                    for (int span = 0; span < 8; ++span) {
+                        const Index3 first = low + Index3(x, y, z);
+                        const bool seen =
+                            std::any_of(drawn.visible.begin(), drawn.visible.end(), [&](const Index3& v) {
+                                const Index3 off = v - first;
+                                return off.x >= 0 && off.x <= (span & 1) && off.y >= 0 &&
+                                       off.y <= (span >> 1 & 1) && off.z >= 0 && off.z <= span >> 2;
+                            });
+                        ASSERT_EQ((drawn.space.spans[i] >> span & 1) != 0, seen);
+                    }
+    }
+}
+
 TEST(EmptySpace, ACornerIsClearOfBlocksUpToTheNearestVisibleOne) {
     std::mt19937 random(2);
     for (int round = 0; round < 200; ++round) {
