@@ -167,7 +167,7 @@ PreIntegrated2D build_pre_integrated_2d(const ClassificationInputs& in) {
     });
     if (in.inside == InsideRule::linear || in.inside == InsideRule::nlpi)
         m.fades = build_fade_cells(entries, size, length, in.inside == InsideRule::linear, encode);
-    m.to_way = Rescale(-kWayBits, Spec{{1, 0, false}, Rounding::rnd, Overflow::sat});
+    m.to_way = Rescale(0, Spec{{1, kWayBits, false}, Rounding::rnd, Overflow::sat});
     m.to_way.divides = true;
     // Weights are as fine as the input, or finer by as many bits as a node has entries; products of 16-bit
     // nodes and quotients stay within 32-bit lanes.

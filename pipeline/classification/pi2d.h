@@ -34,7 +34,7 @@ struct PreIntegrated2D {
 
     template <class V>
     void visit(V&& v) {
-        prefix.visit(v), premultiplied.visit(v), v(cells), v(to_node), v(to_color), v(to_alpha);
+        prefix.visit(v), premultiplied.visit(v), v(cells), v(to_node), v(to_color), v(to_alpha), v(to_way);
         for (CellTable& fade : fades) v(fade);
     }
     int entry_reach() const { return (entries - 2) / (cells.size() - 1) + 1; }

@@ -162,6 +162,25 @@ TEST(FadingLight, OfATurningSlabIsThePapers) {
         EXPECT_NEAR(lit<Real<double>>(nlpi, degrees), lit<Real<double>>(linear, degrees), 1e-9) << degrees;
 }
 
+// A wall's place is that of its entry on the way.
+TEST(FadingLight, EndsAtTheWall) {
+    const Plan plan =
+        plan_of("linear", 1, "default",
+                {"transfer_function.points=[[0,1,1,1,0.1],[2015,1,1,1,0.1],[2080,1,1,1,1],[4095,1,1,1,1]]"});
+    const auto& method = std::get<PreIntegrated2D>(plan.method);
+    const Word full = Word{1} << plan.location.length_fraction;
+    int walls = 0;
+    for (Word back = 0; back <= plan.input.highest; back += 97) {
+        const CutSlab<Word> cut = cut_at_wall(method.prefix, Word{0}, back);
+        const Slab<Word> slab = classify(method, Word{0}, back, full);
+        const FadingLight<Word> light = fading_light(method, Word{0}, back, full, slab);
+        const double way = cut.wall ? static_cast<double>(cut.end_input) / static_cast<double>(back) : 1;
+        EXPECT_NEAR(static_cast<double>(light.end), std::ldexp(way, kWayBits), 0.5) << back;
+        walls += cut.wall && way < 0.9;
+    }
+    EXPECT_GT(walls, 20);
+}
+
 TEST(FadingLight, InWordsErrsByAFewLastBits) {
     for (const char* rule : {"linear", "nlpi"}) {
         const Plan words = plan_of(rule, 1, "default"), real = plan_of(rule, 1, "real");
