@@ -17,7 +17,7 @@ import statistics
 import subprocess
 
 SCENES = sorted(p.stem for p in pathlib.Path("configs/bench").glob("*.toml"))
-RULES = ["mean", "front", "middle", "adaptive"]
+RULES = ["mean", "front", "middle", "centroid", "two_point", "adaptive", "linear", "nlpi"]
 
 
 def settings(rule, step):

@@ -252,10 +252,13 @@ class Slabs {
         if (inside.rule == InsideRule::front) return light_with(gradient_of(front), slab);
         if (inside.rule == InsideRule::middle) return light_with(gradient_between(front, back, 1, 1), slab);
         const std::array<W, 3>&at_front = gradient_of(front), &at_back = gradient_of(back);
-        if constexpr (requires { method_.fades; })
+        if constexpr (requires { method_.prefix; }) {
             if (lights_fade(inside.rule))
                 return light_fading(at_front, at_back, fading_light_of(front.input, back.input, length, slab),
                                     slab);
+            if (lights_at_places(inside.rule))
+                return light_places(at_front, at_back, front.input, back.input, length, slab);
+        }
         observer_.at(Part::gradient);
         const std::array<W, 3> sum = sum_of_ends(at_front, at_back);
         if (inside.rule == InsideRule::mean) return light_with(sum, slab);
@@ -280,24 +283,39 @@ class Slabs {
 
     FadingLight<W> fading_light_of(W front, W back, W length, const Slab<W>& slab) const {
         observer_.at(Part::classification);
-        return fading_light(method_, front, back, length, slab);
+        if constexpr (requires { method_.fades; })
+            return fading_light(method_, front, back, length, slab);
+        else
+            return fading_light_of_quarters(plan_.inside, method_, front, back, length, slab);
+    }
+    // Lights a slab by the gradients at one or two places between its ends.
+    void light_places(const std::array<W, 3>& at_front, const std::array<W, 3>& at_back, W front, W back,
+                      W length, Slab<W>& slab) const {
+        observer_.at(Part::classification);
+        const LightPlaces<W> places = places_of_light(plan_.inside, method_.prefix, front, back, length);
+        const auto gradient_there = [&](W way) {
+            observer_.at(Part::gradient);
+            return gradient_up_to(plan_.inside, at_front, at_back, way);
+        };
+        Slab<W> far = slab;
+        light_with(gradient_there(places.near), slab);
+        if (plan_.inside.rule == InsideRule::centroid) return;
+        light_with(gradient_there(places.far), far, false);
+        observer_.at(Part::shading);
+        slab.color = light_of_places(plan_.inside, slab.color, far.color, places.share);
     }
     // Lights a slab between two raw gradients, where its tables say where its light lies.
     void light_fading(const std::array<W, 3>& at_front, const std::array<W, 3>& at_back,
                       const FadingLight<W>& light, Slab<W>& slab) const {
         observer_.at(Part::gradient);
-        const std::array<W, 3> at_end = gradient_up_to(plan_.inside, at_front, at_back, light.end);
+        const std::array<std::array<W, 3>, 2> gradient{
+            gradient_up_to(plan_.inside, at_front, at_back, constant<W>(0)),
+            gradient_up_to(plan_.inside, at_front, at_back, light.end)};
         observer_.at(Part::normal);
-        const bool fades = plan_.gradient.fades;
-        const W zero = constant<W>(0);
-        const std::array<W, 2> certain{fades ? confidence(plan_.gradient, at_front) : zero,
-                                       fades ? confidence(plan_.gradient, at_end) : zero};
-        std::array<std::array<W, 3>, 2> normal{normalise(plan_.gradient, at_front),
-                                               normalise(plan_.gradient, at_end)};
-        share_normal(normal[0], normal[1]);
-        observer_.lit(normal[0]);
+        const FadingNormals<W> ends = fading_normals(plan_.gradient, gradient);
+        observer_.lit(ends.normal[0]);
         observer_.at(Part::shading);
-        shade_fading(plan_.shading, ray_, normal, certain, light, slab.color);
+        shade_fading(plan_.shading, ray_, ends.normal, ends.certain, light, slab.color);
     }
 
     // A slab from 2^bits pieces, lit if light falls on it; input_at(i): between pieces i - 1 and i.

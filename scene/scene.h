@@ -35,7 +35,9 @@ enum class InsideRule {
     middle,
     adaptive,
     linear,
-    nlpi
+    nlpi,
+    centroid,
+    two_point
 };  // where inside a slab its light is computed
 enum class PowerRule { squaring, parabola, table };
 enum class CompositingForm {
@@ -73,7 +75,7 @@ SQUINT_NAMES(AlphaEncoding, "alpha", "sqrt_alpha", "transparency");
 SQUINT_NAMES(ShadingModel, "none", "phong", "blinn_phong", "cone", "gooch");
 SQUINT_NAMES(ConeSlope, "energy", "paper");
 SQUINT_NAMES(CoolSide, "shadow", "light");
-SQUINT_NAMES(InsideRule, "mean", "front", "middle", "adaptive", "linear", "nlpi");
+SQUINT_NAMES(InsideRule, "mean", "front", "middle", "adaptive", "linear", "nlpi", "centroid", "two_point");
 SQUINT_NAMES(PowerRule, "squaring", "parabola", "table");
 SQUINT_NAMES(CompositingForm, "auto", "w", "w_carry", "equation_9", "alpha", "back_to_front", "unit255_shift",
              "unit255_blinn", "straight");
@@ -290,9 +292,10 @@ void visit_scene(S& scene, V&& visit) {
     visit(
         "shading.inside", shading.inside,
         "where inside a slab its light is taken: mean of the ends' gradients, front, middle, adaptive (1, 2 "
-        "or 4 pieces as it turns), linear (fades from end to end) or nlpi (with the normal kept at length "
+        "or 4 pieces as it turns), linear (fades from end to end), nlpi (with the normal kept at length "
         "one), "
-        "both of pi2d; default: mean; pc and pc_mid have one sample");
+        "centroid (of the light) or two_point (places of half the light each); default: the method's, which "
+        "the plan names; pc and pc_mid have one sample");
     visit("shading.cone_slope", shading.cone_slope, "cone: energy, (n + 1) / 2 of exponent n, or paper, n");
     visit("shading.cool_side", shading.cool_side, "gooch: what turns cool, shadow or light (as printed)");
     visit("shading.cool", shading.cool, "gooch: colour of the cool side");

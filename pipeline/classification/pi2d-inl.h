@@ -79,12 +79,7 @@ HWY_INLINE FadingLight<W> fading_light(const PreIntegrated2D& m, W front, W back
     const EntryPosition<W> f = node_position(m, front), b = node_position(m, cut.end_input);
     const auto has_wall = constant<W>(0) < cut.wall;
     const auto other = is_shorter(m.prefix.entries, length) | has_wall;
-    FadingLight<W> light{static_cast<int>(m.fades.size()) + 1, {}, constant<W>(std::int64_t{1} << kWayBits)};
-    if (any(has_wall)) {
-        const W part = within(quotient(absolute(cut.end_input - front), divisor<W>(cut.span), m.to_way), 0,
-                              std::int64_t{1} << kWayBits);
-        light.end = select(has_wall, part, light.end);
-    }
+    FadingLight<W> light{static_cast<int>(m.fades.size()) + 1, {}, way_to_wall(cut, m.to_way)};
     const auto with_white = [&](const Slab<W>& s) -> std::array<W, 4> {
         return {s.color[0], s.color[1], s.color[2], largest_color(m.premultiplied, s.alpha)};
     };

@@ -99,6 +99,17 @@ HWY_INLINE CutSlab<W> cut_at_wall(const PrefixLookup& p, W front, W back) {
     return cut;
 }
 
+/// The part of a slab's way up to the wall that ends it, or all of it, in 1.kWayBits.
+template <class W>
+HWY_INLINE W way_to_wall(const CutSlab<W>& cut, const Rescale& to_way) {
+    const std::int64_t all = std::int64_t{1} << kWayBits;
+    const auto has_wall = constant<W>(0) < cut.wall;
+    if (!any(has_wall)) return constant<W>(all);
+    const W way =
+        within(quotient(absolute(cut.end_input - cut.front_input), divisor<W>(cut.span), to_way), 0, all);
+    return select(has_wall, way, constant<W>(all));
+}
+
 /// The optical depth of a slab of `length` from a difference of T over a span of inputs, at least one.  N:
 /// the word or its Wide.
 template <class N, class W>
@@ -147,16 +158,23 @@ inline Real<double> exact_depth(const PrefixLookup& p, const CutSlab<Real<double
                      p.to_shorter);
 }
 
+/// The difference of T between two positions in its rows, exact, with gained_bits() more fraction bits than its
+/// words.
+template <class W>
+HWY_INLINE Wide<W> depth_between(const PrefixLookup& p, const EntryPosition<W>& from,
+                                 const EntryPosition<W>& to) {
+    const int bits = p.place_bits();
+    Wide<W> difference = prefix_difference(p.depth, from, to, 0, bits, p.most_rise);
+    if (p.curved) difference = shift_left(difference, bits + 1) - (bend_at(p, to) - bend_at(p, from));
+    return absolute(difference);
+}
+
 /// The optical depth of a cut slab.
 template <class W>
 HWY_INLINE W slab_depth(const PrefixLookup& p, const CutSlab<W>& cut, W length) {
     if constexpr (std::is_same_v<W, Real<double>>)
         if (!p.depth.active) return exact_depth(p, cut, length);
-    const int bits = p.place_bits();
-    Wide<W> difference = prefix_difference(p.depth, cut.front, cut.end, 0, bits, p.most_rise);
-    if (p.curved)
-        difference = shift_left(difference, bits + 1) - (bend_at(p, cut.end) - bend_at(p, cut.front));
-    return depth_of(p, absolute(difference), widen(divisor<W>(cut.span)), length);
+    return depth_of(p, depth_between(p, cut.front, cut.end), widen(divisor<W>(cut.span)), length);
 }
 
 /// Without rounding: a slab of the curves between entries.

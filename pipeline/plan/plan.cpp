@@ -159,19 +159,24 @@ InsideRule inside_rule(Plan& plan) {
                             name_of(*asked), method));
         return InsideRule::front;
     }
+    // A rule that looks into a slab wants tables that serve its parts, or pi2d's own of where its light lies.
     const bool has_parts = std::visit([](const auto& m) { return !m.kPremultiplied; }, plan.method);
-    const bool has_fades = plan.scene.classification.method == Method::pi2d;
-    if (asked == InsideRule::adaptive && !has_parts)
-        throw InputError(
-            fmt::format("{}: found \"adaptive\", but {} has no tables for parts of a slab; allowed: mean, "
-                        "front, middle{}, "
-                        "or classification.method = \"pips\" or \"leg\"",
-                        where(plan.scene, "shading.inside"), method, has_fades ? ", linear, nlpi" : ""));
-    if (asked && lights_fade(*asked) && !has_fades)
+    const bool has_fades = has_parts || plan.scene.classification.method == Method::pi2d;
+    const auto is_allowed = [&](InsideRule rule) {
+        return rule == InsideRule::adaptive ? has_parts : !lights_fade(rule) || has_fades;
+    };
+    if (asked && !is_allowed(*asked)) {
+        std::string allowed;
+        for (std::size_t i = 0; i < std::size(EnumNames<InsideRule>::names); ++i)
+            if (is_allowed(static_cast<InsideRule>(i)))
+                allowed += fmt::format("{}, ", EnumNames<InsideRule>::names[i]);
         throw InputError(fmt::format(
-            "{}: found \"{}\", but {} has no tables of where light lies in a slab; allowed: mean, front, "
-            "middle{}, or classification.method = \"pi2d\"",
-            where(plan.scene, "shading.inside"), name_of(*asked), method, has_parts ? ", adaptive" : ""));
+            "{}: found \"{}\", but {} has no tables {}; allowed: {}or classification.method = {}\"pips\" or "
+            "\"leg\"",
+            where(plan.scene, "shading.inside"), name_of(*asked), method,
+            lights_fade(*asked) ? "of where light lies in a slab" : "for parts of a slab", allowed,
+            lights_fade(*asked) ? "\"pi2d\", " : ""));
+    }
     return asked.value_or(InsideRule::mean);
 }
 
@@ -245,7 +250,8 @@ namespace {
 // Lanes of floats need tables in floats, and room for the errors of floats.
 void prepare_floats(Plan& plan) {
     need_floats(plan.method);
-    plan.shading.power_table.need_floats();
+    for (const Table* table : {&plan.shading.power_table, &plan.shading.kept.arc, &plan.inside.even.rows})
+        table->need_floats();
     // Lanes ask whether an entry is opaque where a lane is near one: none may be missed.
     const auto lower = [](EntryLookup& e) { e.least_opaque -= e.least_opaque >> 20; };
     std::visit(
@@ -302,6 +308,8 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
     plan_classification(plan);
     in.premultiplied = std::visit([](const auto& m) { return m.kPremultiplied; }, plan.method);
     in.inside = inside_rule(plan);
+    if (plan.lit && plan.needs_back)
+        plan.stages[4].why = fmt::format("shading.inside = \"{}\"", name_of(in.inside));
     plan.inside = build_inside(in, plan.location);
     if (looks_twice(plan)) plan.walls = build_walls(plan.entries, std::int64_t{v.largest} + 1);
     plan.gradient = build_gradient(in);

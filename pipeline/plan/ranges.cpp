@@ -90,8 +90,8 @@ void choose_words(Plan& plan) {
         if (needs[i].result_bits > 127)
             throw InputError(
                 fmt::format("precision: the stage '{}' needs a word of {} bits or more with these formats, "
-                            "and there are 127: narrow {}",
-                            kStages[i], needs[i].result_bits, plan.stages[i].why));
+                            "and there are 127: narrow its wires",
+                            kStages[i], needs[i].result_bits));
     }
     plan.word_bits = all.result_bits <= 63 ? 64 : 128;
     static_assert(kWires <= 64);

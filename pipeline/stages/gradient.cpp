@@ -70,8 +70,8 @@ GradientStage build_gradient(const StageInputs& in) {
     s.to_confidence.divides = true;
     if (const double floor = in.scene.shading.gradient_floor; in.lit && floor > 0) {
         require_integer_bits(in, Wire::confidence, 1, "a confidence of 1.0");
-        // The sum of the gradients at a slab's ends is twice as long as their mean.
-        fade_in_up_to(s, (lights_by_ends(in.inside) ? 2 : 1) * floor * one);
+        const std::int64_t scale = gradient_scale(in.inside, in.specs[Wire::gradient].format);
+        fade_in_up_to(s, static_cast<double>(scale) * floor * one);
     }
     Exaggeration& e = s.exaggerated;
     e.exact = in.scene.shading.exaggeration;

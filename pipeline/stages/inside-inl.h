@@ -10,7 +10,7 @@
 
 #include "fixedpoint/unrolled-inl.h"
 #include "pipeline/classification/prefix-inl.h"
-#include "pipeline/stages/gradient.h"
+#include "pipeline/stages/gradient-inl.h"
 
 #include <hwy/highway.h>
 
@@ -84,22 +84,199 @@ template <class W>
 HWY_INLINE std::array<W, 3> sum_of_ends(const std::array<W, 3>& front, const std::array<W, 3>& back) {
     return {front[0] + back[0], front[1] + back[1], front[2] + back[2]};
 }
-/// A piece's gradient: twice as long beside such sums, where lengths matter.
+/// A piece's gradient: as long as those beside it, where lengths matter.
 template <class W>
 HWY_INLINE std::array<W, 3> for_pieces(const InsideStage& s, const GradientStage& g,
                                        const std::array<W, 3>& gradient) {
-    return doubles_pieces(s, g) ? sum_of_ends(gradient, gradient) : gradient;
+    const int bits = bits_of_pieces(s, g);
+    return {shift_left(gradient[0], bits), shift_left(gradient[1], bits), shift_left(gradient[2], bits)};
 }
 
-/// The gradient part of the way from a slab's front to its back.
+/// The gradient part of the way from a slab's front to its back, gradient_scale() as long.
 template <class W>
 HWY_INLINE std::array<W, 3> gradient_up_to(const InsideStage& s, const std::array<W, 3>& front,
                                            const std::array<W, 3>& back, W way) {
+    const std::int64_t whole = std::int64_t{1} << s.way_between.kept;
+    const W there = within(quantise(way, s.to_way_between), 0, whole);
     std::array<W, 3> gradient;
     for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
-        gradient[a] = front[a] + quantise((back[a] - front[a]) * way, s.to_end);
+        gradient[a] = quantise(blend(front[a], back[a], there, s.way_between.kept), s.to_between);
     });
     return gradient;
+}
+
+/// The optical depth of a slab up to its wall, of any method with prefix sums.
+template <class W>
+HWY_INLINE W depth_up_to_wall(const PrefixLookup& p, const CutSlab<W>& cut, const Wide<W>& difference,
+                              W length) {
+    W depth = depth_of(p, difference, widen(divisor<W>(cut.span)), length);
+    const auto point = cut.span == constant<W>(0);
+    if (any(point)) depth = select(point, point_depth(p.entries, cut.front, length), depth);
+    return depth;
+}
+/// Lean and spread of even matter (EvenMatter).
+template <class W>
+HWY_INLINE W even_matter(const EvenMatter& even, W depth, int column) {
+    const int fraction = even.depth_fraction - even.row_bits;
+    const std::int64_t one = std::int64_t{1} << fraction;
+    const W row = min(floor_shift(depth, fraction), constant<W>(even.rows.rows() - 2));
+    const W rest = within(min(depth - shift_left(row, fraction), constant<W>(one)), 0, one);
+    return quantise(blend(gather(even.rows, row, column), gather(even.rows, row + constant<W>(1), column),
+                          rest, fraction),
+                    even.to_row);
+}
+
+/// Where along a slab its light comes from: `share` of it, in 1.kShareBits, from `far`, the rest from `near`, both
+/// in 1.kWayBits.
+template <class W>
+struct LightPlaces {
+    W near, far, share;
+};
+/// With y the share of the slab's depth x in front of a place u, u is taken as straight in y, by its two first
+/// moments (LEG(2) with u for a colour):
+///
+///     L_0 = int u dy = 1 - int y du,   L_1 = int u (2y - 1) dy = int y (1 - y) du,
+///     u(y) = L_0 + 3 L_1 (2y - 1) at y = mean, mean - spread and mean + spread of even matter
+///
+/// Both integrals by Simpson's rule over the slab's quarters, of which T gives y: exact for even matter, and no
+/// term is negative.  What a wall leaves of the light comes from the wall.
+template <class W>
+HWY_INLINE LightPlaces<W> places_of_light(const InsideStage& s, const PrefixLookup& p, W front, W back,
+                                          W length) {
+    constexpr std::int64_t kOne = std::int64_t{1} << kShareBits;
+    constexpr std::int64_t kLeastSpan = 16;  // inputs between which quarters' own roundings are small
+    const W zero = constant<W>(0), one = constant<W>(kOne);
+    const CutSlab<W> cut = cut_at_wall(p, front, back);
+    const auto row_at = [&](W input) {
+        EntryPosition<W> at = sub_entry_position(p.entries, p.sub_entry_bits, input);
+        at.fraction = within(at.fraction, 0, std::int64_t{1} << p.place_bits());
+        return at;
+    };
+    const EntryPosition<W> start = row_at(cut.front_input);
+    const Wide<W> all = depth_between(p, start, row_at(cut.end_input)), some = divisor<W>(all);
+    const auto is_short = absolute(cut.end_input - cut.front_input) < constant<W>(kLeastSpan);
+    const auto share_at = [&](int part) {
+        const Wide<W> up_to =
+            depth_between(p, start, row_at(input_between(s, cut.front_input, cut.end_input, part, 2)));
+        return select(is_short, constant<W>(kOne / kQuarters * part),
+                      min(divide(up_to, some, s.to_share), one));
+    };
+    const std::array<W, 3> y{share_at(1), share_at(2), share_at(3)};
+    const auto square = [&](W share) {
+        return within(quantise(share * within(one - share, 0, kOne), s.to_square), 0, kOne / 4);
+    };
+    // 12 L_0 and 36 L_1.
+    const W mean = constant<W>(11 * kOne) - shift_left(y[0] + y[2], 2) - shift_left(y[1], 1);
+    const W turn = constant<W>(6) * (shift_left(square(y[0]) + square(y[2]), 1) + square(y[1]));
+    const W depth = depth_up_to_wall(p, cut, all, length);
+    const W lean = even_matter(s.even, depth, 0);
+    const auto place = [&](W less) {
+        const W twelvefold = clamp(mean - quantise(turn * less, s.to_moment), zero, constant<W>(12 * kOne));
+        return min(divide(twelvefold, constant<W>(12), s.to_place), constant<W>(std::int64_t{1} << kWayBits));
+    };
+    LightPlaces<W> places{};
+    if (s.rule == InsideRule::two_point) {
+        const W spread = even_matter(s.even, depth, 1);
+        places = {place(min(lean + spread, one)), place(lean - spread), constant<W>(kOne / 2)};
+    } else {
+        places.near = places.far = place(lean), places.share = zero;
+    }
+    if (!p.predicts) return places;
+    const auto has_wall = zero < cut.wall;
+    if (!any(has_wall)) return places;
+    const W way = way_to_wall(cut, s.to_way);
+    const W behind =
+        within(one - min(quantise(opacity_of_depth(p.entries.opacity, depth), s.to_behind), one), 0, kOne);
+    const W before = min(quantise(place(lean) * way, s.to_along), way);
+    if (s.rule == InsideRule::two_point) {
+        places.near = select(has_wall, before, places.near), places.far = select(has_wall, way, places.far);
+        places.share = select(has_wall, behind, places.share);
+    } else {
+        const W ahead = within(way - before, 0, std::int64_t{1} << kWayBits);
+        const W both = min(before + quantise(behind * ahead, s.to_ahead), way);
+        places.near = places.far = select(has_wall, both, places.near);
+    }
+    return places;
+}
+/// The light of two places.
+template <class W>
+HWY_INLINE std::array<W, 3> light_of_places(const InsideStage& s, const std::array<W, 3>& near,
+                                            const std::array<W, 3>& far, W share) {
+    std::array<W, 3> color;
+    for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
+        color[c] = quantise(blend(near[c], far[c], share, kShareBits), s.to_parts);
+    });
+    return color;
+}
+/// Where light lies in a slab of a method that classifies parts of slabs: in its quarters, each of even matter.  A
+/// quarter's share of the light is what is seen of it; beside the slab's colour that of all quarters counts alone.
+/// Parts are straight: they sum to the slab's colour, and white to one.  A wall's light lies at its place.
+template <class W, class M>
+HWY_INLINE FadingLight<W> fading_light_of_quarters(const InsideStage& s, const M& m, W front, W back,
+                                                   W length, const Slab<W>& whole) {
+    constexpr Quarters kCubic = bernstein_quarters(3), kLinear = bernstein_quarters(1);
+    const Quarters& quarters = s.rule == InsideRule::linear ? kLinear : kCubic;
+    const auto count = s.rule == InsideRule::linear ? std::size_t{2} : std::size_t{4};
+    constexpr std::int64_t kOne = std::int64_t{1} << kShareBits;
+    const PrefixLookup& p = m.prefix;
+    const W zero = constant<W>(0), one = constant<W>(s.one_color);
+    const CutSlab<W> cut = cut_at_wall(p, front, back);
+    const auto has_wall = zero < cut.wall;
+    FadingLight<W> light{static_cast<int>(count), {}, way_to_wall(cut, s.to_way)};
+    W whole_length = length;
+    if (any(has_wall))
+        whole_length = select(has_wall, min(quantise(length * light.end, s.to_cut_length), length), length);
+
+    std::array<Slab<W>, kQuarters> quarter;
+    std::array<W, kQuarters> seen, lean;
+    W through = constant<W>(s.one_alpha), near = cut.front_input, near_length = zero;
+    for (int i = 1; i <= kQuarters; ++i) {
+        const auto at = static_cast<std::size_t>(i - 1);
+        const W far = input_between(s, cut.front_input, cut.end_input, i, 2);
+        const W far_length = i == kQuarters ? whole_length : length_up_to(s, whole_length, i, 2);
+        const W part_length = within(far_length - near_length, 0, s.full_length);
+        quarter[at] = classify(m, near, far, part_length);
+        const CutSlab<W> part = cut_at_wall(p, near, far);
+        const auto row_at = [&](W input) { return sub_entry_position(p.entries, p.sub_entry_bits, input); };
+        const W depth =
+            depth_up_to_wall(p, part, depth_between(p, row_at(near), row_at(part.end_input)), part_length);
+        lean[at] = even_matter(s.even, depth, 0);
+        seen[at] = min(quantise(through * quarter[at].alpha, s.to_part), through);
+        through = within(through - seen[at], 0, s.one_alpha);
+        near = far, near_length = far_length;
+    }
+    const W all = max(constant<W>(s.one_alpha) - through, constant<W>(1));
+    std::array<std::array<W, 4>, 4> sum{};
+    for (auto& part : sum) part.fill(zero);
+    for (std::size_t i = 0; i < kQuarters; ++i) {
+        const W share = min(quotient(seen[i], all, s.to_share), constant<W>(kOne));
+        const auto at_end = has_wall & (i + 1 == kQuarters ? zero == zero : zero < zero);
+        for (std::size_t k = 0; k < count; ++k) {
+            const W even = constant<W>(quarters.mean[k][i] << (kShareBits - kMeanBits)) -
+                           quantise(lean[i] * constant<W>(quarters.rise[k][i]), s.to_shift);
+            const W fade =
+                clamp(select(at_end, constant<W>(k + 1 == count ? kOne : 0), even), zero, constant<W>(kOne));
+            const W part = within(quantise(share * fade, s.to_square), 0, kOne);
+            for (std::size_t c = 0; c < 3; ++c) sum[k][c] = sum[k][c] + part * quarter[i].color[c];
+            sum[k][3] = sum[k][3] + part;
+        }
+    }
+    for (std::size_t c = 0; c < 4; ++c) {
+        std::array<W, 4> part;
+        W quarters_color = zero;
+        for (std::size_t k = 0; k < count; ++k) {
+            part[k] = min(quantise(sum[k][c], c < 3 ? s.to_color : s.to_white), one);
+            quarters_color = quarters_color + part[k];
+        }
+        const W color = c < 3 ? min(whole.color[c], one) : one;
+        W left = color;
+        for (std::size_t k = 1; k < count; ++k) {
+            light.part[k][c] = min(divide(part[k] * color, divisor<W>(quarters_color), s.to_scaled), left);
+            left = within(left - light.part[k][c], 0, s.one_color);
+        }
+        light.part[0][c] = left;
+    }
+    return light;
 }
 /// Of two normals, one of which is zero, both become the other.
 template <class W>
@@ -114,6 +291,24 @@ HWY_INLINE void share_normal(std::array<W, 3>& front, std::array<W, 3>& back) {
         front[a] = select(front_is_zero, back[a], front[a]);
         back[a] = select(back_is_zero, from_front, back[a]);
     }
+}
+
+/// The normals between which light fades, and how far each is to be trusted.
+template <class W>
+struct FadingNormals {
+    std::array<std::array<W, 3>, 2> normal;
+    std::array<W, 2> certain;
+};
+template <class W>
+HWY_INLINE FadingNormals<W> fading_normals(const GradientStage& s,
+                                           const std::array<std::array<W, 3>, 2>& gradient) {
+    FadingNormals<W> ends;
+    for (std::size_t end = 0; end < 2; ++end) {
+        ends.normal[end] = normalise(s, gradient[end]);
+        ends.certain[end] = s.fades ? confidence(s, gradient[end]) : constant<W>(0);
+    }
+    share_normal(ends.normal[0], ends.normal[1]);
+    return ends;
 }
 
 /// The light of a slab's pieces, front to back, joined to one colour.

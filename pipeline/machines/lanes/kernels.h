@@ -65,6 +65,17 @@ struct StageKernels {
                        LitSamples& ends) = nullptr;
     /// Raw gradients of packed slabs: the sums of those at their ends.
     void (*add_ends)(const Plan&, int count, const EndGradients&, LitSamples&) = nullptr;
+    /// Where light lies in packed slabs, as shading.inside asks: at one or two places, or fading.
+    void (*find_light)(const Plan&, int count, const LitSamples&, SlabLight&) = nullptr;
+    /// Raw gradients on the way from one end to the other of the slabs `from`.
+    void (*lerp_ends)(const Plan&, int count, const EndGradients&, const Batch& from, const Batch& way,
+                      LitSamples&) = nullptr;
+    /// Joins light from two places; `far` has that of the second.
+    void (*join_places)(const Plan&, int count, const SlabLight&, const LitSamples& far,
+                        LitSamples&) = nullptr;
+    /// Lights slabs by what fades from their normals to those of `far`.
+    void (*shade_fading)(const Plan&, int count, const SlabLight&, const LitSamples& far,
+                         LitSamples&) = nullptr;
     /// Stores places `part` 2^-bits of the way along packed slabs [at, at + count), from place `to` on.
     void (*place_between)(const Plan&, const LitSamples& slabs, int at, int count, int part, int bits,
                           LitSamples& places, int to) = nullptr;

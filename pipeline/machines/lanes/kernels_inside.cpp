@@ -5,13 +5,13 @@
 #define HWY_TARGET_INCLUDE "pipeline/machines/lanes/kernels_inside.cpp"
 #include <hwy/foreach_target.h>
 
-#include "fixedpoint/words/float_lanes-inl.h"
-#include "fixedpoint/words/lane_quotients-inl.h"
-#include "fixedpoint/words/lane_tables-inl.h"
+#include "fixedpoint/words/all_lanes-inl.h"
+#include "pipeline/classification/methods-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/machines/lanes/packing-inl.h"
 #include "pipeline/stages/inside-inl.h"
 #include "pipeline/stages/location-inl.h"
+#include "pipeline/stages/shading-inl.h"
 
 #include <algorithm>
 #include <array>
@@ -149,6 +149,19 @@ HWY_INLINE auto end_words(const lanes::EndGradients& ends, int component, const 
     const hn::ScalableTag<Word> d;
     return hn::GatherIndex(d, ends.component[component].v + (back ? kRays : 0), hn::Load(d, from));
 }
+/// Those of kStep packed slabs, side by side.
+template <int kStep>
+HWY_INLINE void load_ends(const lanes::EndGradients& ends, const Word* from, Word (&end)[2][3][kStep]) {
+    const hn::ScalableTag<Word> d;
+    for (int e = 0; e < 2; ++e)
+        for (int a = 0; a < 3; ++a)
+            for (int i = 0; i < kStep; i += kLanes)
+                hn::Store(end_words(ends, a, from + i, e == 1), d, end[e][a] + i);
+}
+template <class L, int kStep>
+HWY_INLINE std::array<L, 3> end_at(const Word (&end)[3][kStep], int i) {
+    return {load<L>(end[0] + i), load<L>(end[1] + i), load<L>(end[2] + i)};
+}
 /// The raw gradients of packed slabs: sum_of_ends() over the words of the buffers.
 void add_slab_ends(const Plan& plan, int count, const lanes::EndGradients& ends, LitSamples& lit) {
     const hn::ScalableTag<Word> d;
@@ -164,24 +177,112 @@ void add_slab_ends(const Plan& plan, int count, const lanes::EndGradients& ends,
         }
 }
 
+/// Raw gradients on the way from front to back: gradient_up_to() of the words of the buffers.
+template <class L>
+void lerp_slab_ends(const Plan& plan, int count, const lanes::EndGradients& ends, const lanes::Batch& from,
+                    const lanes::Batch& way, LitSamples& lit) {
+    constexpr int kStep = std::max(kLanes, static_cast<int>(L::count()));
+    alignas(64) Word end[2][3][kStep];
+    for (int first = 0; first < count; first += kStep) {
+        load_ends<kStep>(ends, from.v + first, end);
+        for (int i = 0; i < kStep; i += static_cast<int>(L::count())) {
+            const std::array<L, 3> gradient = gradient_up_to(
+                plan.inside, end_at<L>(end[0], i), end_at<L>(end[1], i), load<L>(way.v + first + i));
+            for (std::size_t a = 0; a < 3; ++a) store(gradient[a], lit.gradient[a].v + first + i);
+        }
+    }
+}
+
+const PrefixLookup* prefix_of(const Plan& plan) {
+    return std::visit(
+        [](const auto& m) -> const PrefixLookup* {
+            if constexpr (requires { m.prefix; }) return &m.prefix;
+            return nullptr;
+        },
+        plan.method);
+}
+/// Where packed slabs' light comes from.
+template <class L>
+void find_places(const Plan& plan, int count, const LitSamples& lit, lanes::SlabLight& light) {
+    const PrefixLookup& prefix = *prefix_of(plan);
+    for (int at = 0; at < count; at += static_cast<int>(L::count())) {
+        const LightPlaces<L> places =
+            places_of_light(plan.inside, prefix, load<L>(lit.input[0].v + at), load<L>(lit.input[1].v + at),
+                            load<L>(lit.length.v + at));
+        store(places.near, light.way[0].v + at), store(places.far, light.way[1].v + at);
+        store(places.share, light.share.v + at);
+    }
+}
+/// Where it lies as it fades.
+template <class L, class M>
+void find_fades(const Plan& plan, int count, const LitSamples& lit, lanes::SlabLight& light) {
+    const M& method = std::get<M>(plan.method);
+    for (int at = 0; at < count; at += static_cast<int>(L::count())) {
+        const L front = load<L>(lit.input[0].v + at), back = load<L>(lit.input[1].v + at),
+                length = load<L>(lit.length.v + at);
+        const Slab<L> slab{load_three<L>(lit.color, at), load<L>(lit.alpha.v + at)};
+        FadingLight<L> fades;
+        if constexpr (requires { method.fades; })
+            fades = fading_light(method, front, back, length, slab);
+        else
+            fades = fading_light_of_quarters(plan.inside, method, front, back, length, slab);
+        store(constant<L>(0), light.way[0].v + at), store(fades.end, light.way[1].v + at);
+        for (std::size_t k = 0; k < static_cast<std::size_t>(fades.count); ++k)
+            for (std::size_t c = 0; c < 4; ++c) store(fades.part[k][c], light.part[k][c].v + at);
+    }
+}
+template <class L>
+RayWords<L> stored_ray(const ShadingStage& shading, const LitSamples& lit, int at) {
+    RayWords<L> ray;
+    if (!shading.needs_ray()) return ray;
+    ray.view = load_three<L>(lit.view, at);
+    for (std::size_t l = 0; l < static_cast<std::size_t>(shading.lights); ++l)
+        ray.half[l] = load_three<L>(lit.half[l], at);
+    return ray;
+}
+template <class L>
+void shade_fading_slabs(const Plan& plan, int count, const lanes::SlabLight& light, const LitSamples& far,
+                        LitSamples& lit) {
+    const int parts = plan.inside.rule == InsideRule::linear ? 2 : 4;
+    for (int at = 0; at < count; at += static_cast<int>(L::count())) {
+        FadingNormals<L> ends{{load_three<L>(lit.normal, at), load_three<L>(far.normal, at)},
+                              {constant<L>(0), constant<L>(0)}};
+        if (plan.gradient.fades)
+            ends.certain = {load<L>(lit.confidence.v + at), load<L>(far.confidence.v + at)};
+        share_normal(ends.normal[0], ends.normal[1]);
+        FadingLight<L> fades{parts, {}, constant<L>(0)};
+        for (std::size_t k = 0; k < static_cast<std::size_t>(parts); ++k)
+            for (std::size_t c = 0; c < 4; ++c) fades.part[k][c] = load<L>(light.part[k][c].v + at);
+        std::array<L, 3> color;
+        shade_fading(plan.shading, stored_ray<L>(plan.shading, lit, at), ends.normal, ends.certain, fades,
+                     color);
+        for (std::size_t a = 0; a < 3; ++a) {
+            store(ends.normal[0][a], lit.normal[a].v + at);
+            store(color[a], lit.color[a].v + at);
+        }
+    }
+}
+template <class L>
+void join_slab_places(const Plan& plan, int count, const lanes::SlabLight& light, const LitSamples& far,
+                      LitSamples& lit) {
+    for (int at = 0; at < count; at += static_cast<int>(L::count())) {
+        const std::array<L, 3> color =
+            light_of_places(plan.inside, load_three<L>(lit.color, at), load_three<L>(far.color, at),
+                            load<L>(light.share.v + at));
+        for (std::size_t c = 0; c < 3; ++c) store(color[c], lit.color[c].v + at);
+    }
+}
+
 /// log2 of the number of pieces of packed slabs.
 template <class L>
 void find_cuts(const Plan& plan, int count, const lanes::EndGradients& ends, LitSamples& lit) {
-    const hn::ScalableTag<Word> d;
     const L zero = constant<L>(0), least = constant<L>(plan.inside.least_cut);
     constexpr int kStep = std::max(kLanes, static_cast<int>(L::count()));
     alignas(64) Word end[2][3][kStep];
     for (int first = 0; first < count; first += kStep) {
-        for (int e = 0; e < 2; ++e)
-            for (int a = 0; a < 3; ++a)
-                for (int i = 0; i < kStep; i += kLanes)
-                    hn::Store(end_words(ends, a, lit.from.v + first + i, e == 1), d, end[e][a] + i);
+        load_ends<kStep>(ends, lit.from.v + first, end);
         for (int i = 0; i < kStep; i += static_cast<int>(L::count())) {
-            const auto at_end = [&](int e) {
-                return std::array<L, 3>{load<L>(end[e][0] + i), load<L>(end[e][1] + i),
-                                        load<L>(end[e][2] + i)};
-            };
-            const L cuts = cuts_between(at_end(0), at_end(1));
+            const L cuts = cuts_between(end_at<L>(end[0], i), end_at<L>(end[1], i));
             store_whole(select(load<L>(lit.alpha.v + first + i) < least, zero, cuts), lit.cuts.v + first + i);
         }
     }
@@ -212,8 +313,27 @@ void inside_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::St
     kernels.pick_by_cuts = &pick_by_cuts;
     lanes::with_word<Lanes, kNothing>(ways.location,
                                       [&]<class L>() { kernels.place_between = &place_between<L>; });
-    lanes::with_word<Lanes, kNothing>(ways.classification, [&]<class L>() { kernels.cut = &cut_sixteen<L>; });
-    lanes::with_word<Lanes, kNothing>(ways.shading, [&]<class L>() { kernels.find_cuts = &find_cuts<L>; });
+    lanes::with_word<Lanes, kNothing>(ways.classification, [&]<class L>() {
+        kernels.cut = &cut_sixteen<L>;
+        if (lights_at_places(plan.inside.rule)) kernels.find_light = &find_places<L>;
+        if (!lights_fade(plan.inside.rule)) return;
+        std::visit(
+            [&]<class M>(const M& m) {
+                constexpr bool kInFloats =
+                    !std::is_same_v<M, MomentSeries>;  // else its floats are the model's
+                if constexpr (requires { m.prefix; } && (kInFloats || !RealWord<L>))
+                    if constexpr (requires { m.fades; } || !M::kPremultiplied)
+                        kernels.find_light = &find_fades<L, M>;
+            },
+            plan.method);
+    });
+    lanes::with_word<Lanes, kNothing>(ways.gradient,
+                                      [&]<class L>() { kernels.lerp_ends = &lerp_slab_ends<L>; });
+    lanes::with_word<Lanes, kNothing>(ways.shading, [&]<class L>() {
+        kernels.join_places = &join_slab_places<L>;
+        kernels.shade_fading = &shade_fading_slabs<L>;
+        kernels.find_cuts = &find_cuts<L>;
+    });
     lanes::with_word<Lanes, kNothing>(plan.lit ? ways.shading : ways.classification,
                                       [&]<class L>() { kernels.join = &join_sixteen<L>; });
 }

@@ -108,7 +108,7 @@ int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, int steps
     const hn::ScalableTag<Word> d;
     const auto zero = hn::Zero(d);
     const bool per_ray = plan.shading.needs_ray(), locations = plan.lights_by_locations();
-    const bool adaptive = plan.inside.rule == InsideRule::adaptive, between = plan.inside.samples_between();
+    const bool within_slabs = looks_into_slabs(plan.inside.rule), between = plan.inside.samples_between();
     const bool places = between || !plan.shares_ends();
     int count = 0;
     for (int at = 0; at < steps * kRays; at += kLanes) {
@@ -132,7 +132,7 @@ int gather_lit_samples(const Plan& plan, const lanes::RayPacket& rays, int steps
         }
         for (int c = 0; c < 3; ++c) pack(s.color[c].v + at, lit.color[c]);
         pack(s.alpha.v + at, lit.alpha);
-        if (adaptive) {
+        if (within_slabs) {
             for (int end = 0; end < 2; ++end) pack(s.input.v + at + end * kRays, lit.input[end]);
             pack(s.length.v + at, lit.length);
         }

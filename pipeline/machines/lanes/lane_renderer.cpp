@@ -150,7 +150,6 @@ StageWays ways_of(const Plan& plan) {
 
 std::optional<std::string> what_needs_the_model(const Plan& plan) {
     if (plan.real && !plan.float32) return "nothing is rounded";
-    if (lights_fade(plan.inside.rule)) return "light that fades inside slabs is drawn by the model";
     if (plan.gradient.exaggerated.wanted && (plan.float32 || plan.gradient_from_samples()))
         return fmt::format("exaggerated normals of {} are drawn by the model",
                            plan.float32 ? "floats" : "gradients from samples");
@@ -205,7 +204,9 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
     for (const Wire wire : stored)
         if (const auto obstacle = most_bits(wire, 31)) return obstacle;
     if (plan.lit)  // the sum of a slab's two ends has one more bit
-        if (const auto obstacle = most_bits(Wire::gradient, plan.shares_ends() ? 30 : 31)) return obstacle;
+        if (const auto obstacle = most_bits(
+                Wire::gradient, plan.shares_ends() && !lights_between_ends(plan.inside.rule) ? 30 : 31))
+            return obstacle;
     return std::nullopt;
 }
 
@@ -309,7 +310,8 @@ void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& 
     Workspace& w = *workspace;
     if (plan_.lit) w.lit = {};  // lanes past the last packed sample are computed, too
     if (plan_.shares_ends()) w.ends = {}, w.end_gradients = {};
-    if (plan_.inside.rule == InsideRule::adaptive || walls_) w.picked = w.pieces = {}, w.cut = {};
+    if (looks_into_slabs(plan_.inside.rule) || walls_)
+        w.picked = w.pieces = {}, w.cut = {}, w.slab_light = {};
     if (walls_) w.twice = {};
     PacketLoop loop(plan_, kernels_, schedule_, voxels_, empty_.get(), walls_.get(), w);
     const bool colors_alone = !plan_.projection_mode && image.channels.size() == 4;

@@ -92,8 +92,14 @@ struct alignas(64) LitSamples {
     Batch normal[3];
     Batch confidence;  // where light fades in
     Batch color[3], alpha;
-    // Where slabs may be cut: inputs at both ends, length, and log2 of the number of pieces.
+    // Where light looks into slabs: inputs at both ends, length, and log2 of the number of pieces.
     Batch input[2], length, cuts;
+};
+
+/// Where light lies in packed slabs: LightPlaces, or FadingLight between the slab's front and its `way[1]`.
+struct alignas(64) SlabLight {
+    Batch way[2], share;
+    Batch part[4][4];
 };
 
 /// Raw gradients at the ends of slabs, by place in the batch.

@@ -58,6 +58,7 @@ struct Workspace {
     EndGradients end_gradients;
     LitSamples picked, pieces;  // slabs lit in one number of pieces, and these pieces
     LitSamples twice;           // slabs looked at twice
+    SlabLight slab_light;
     Samples cut;
     Samples beside;  // neighbours that a gradient is computed from
     Notes notes;
@@ -275,15 +276,43 @@ class PacketLoop {
         if (count == 0) return 0;
         if (plan_.inside.rule == InsideRule::middle)
             kernels_.place_between(plan_, lit, 0, count, 1, 1, lit, 0);
-        if (plan_.shares_ends())
-            kernels_.add_ends(plan_, count, w_.end_gradients, lit);
-        else
-            find_gradients(count, lit);
-        shade(count, lit);
+        if (lights_between_ends(plan_.inside.rule)) {
+            light_between_ends(count, lit);
+        } else {
+            if (plan_.shares_ends())
+                kernels_.add_ends(plan_, count, w_.end_gradients, lit);
+            else
+                find_gradients(count, lit);
+            shade(count, lit);
+        }
         put_back(count, lit);
         if (plan_.inside.rule == InsideRule::adaptive) light_as_it_turns(count);
         if (plan_.walls.looks_twice) put_back_second_looks();
         return count;
+    }
+
+    // By gradients between the ends', at one place or two, or by light that fades.
+    void light_between_ends(int count, LitSamples& lit) {
+        SlabLight& light = w_.slab_light;
+        LitSamples& far = w_.picked;
+        const auto find_normals_at = [&](const Batch& way, LitSamples& to) {
+            kernels_.lerp_ends(plan_, count, w_.end_gradients, lit.from, way, to);
+            kernels_.find_normals(plan_, count, to);
+        };
+        kernels_.find_light(plan_, count, lit, light);
+        find_normals_at(light.way[0], lit);
+        if (plan_.inside.rule == InsideRule::centroid) return kernels_.shade(plan_, count, lit);
+        find_normals_at(light.way[1], far);
+        if (lights_fade(plan_.inside.rule)) return kernels_.shade_fading(plan_, count, light, far, lit);
+        far.alpha = lit.alpha;
+        std::copy_n(lit.color, 3, far.color);
+        if (plan_.shading.needs_ray()) {
+            std::copy_n(lit.view, 3, far.view);
+            for (int l = 0; l < plan_.shading.lights; ++l) std::copy_n(lit.half[l], 3, far.half[l]);
+        }
+        kernels_.shade(plan_, count, lit);
+        kernels_.shade(plan_, count, far);
+        kernels_.join_places(plan_, count, light, far, lit);
     }
 
     // The first half of stage 3, at packed places.
@@ -342,7 +371,8 @@ class PacketLoop {
             }
         }
         find_gradients(count, w_.pieces);
-        if (doubles_pieces(plan_.inside, plan_.gradient)) double_gradients(count, w_.pieces);
+        if (const int bits = bits_of_pieces(plan_.inside, plan_.gradient))
+            lengthen_gradients(count, bits, w_.pieces);
         shade(count, w_.pieces);
         kernels_.join(plan_, w_.pieces.color, w_.pieces.alpha, bits, slabs, at);
         // The normal of a slab is that of its first visible piece.
@@ -391,15 +421,15 @@ class PacketLoop {
     }
 
     // for_pieces of gathered gradients.
-    void double_gradients(int count, LitSamples& lit) const {
-        const auto twice = [&](auto word, Word& bits) {
+    void lengthen_gradients(int count, int by, LitSamples& lit) const {
+        const auto lengthen = [by](auto word, Word& bits) {
             word_from_bits(bits, word);
-            bits = bits_of(word + word);
+            bits = bits_of(shift_left(word, by));
         };
         for (int a = 0; a < 3; ++a)
             for (int i = 0; i < count; ++i)
-                plan_.float32 ? twice(Real<float>{}, lit.gradient[a].v[i])
-                              : twice(std::int64_t{}, lit.gradient[a].v[i]);
+                plan_.float32 ? lengthen(Real<float>{}, lit.gradient[a].v[i])
+                              : lengthen(std::int64_t{}, lit.gradient[a].v[i]);
     }
 
     // Fetches what the gradients of the first `count` packed places need: voxels, or the six samples around

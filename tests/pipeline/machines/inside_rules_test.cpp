@@ -65,7 +65,9 @@ void for_every_rule(F&& f) {
             f(method, rule);
             ++met;
         }
-    EXPECT_GE(met, 14);  // mean, front, middle of four, adaptive of two
+    EXPECT_GE(
+        met,
+        28);  // mean, front, middle, centroid, two_point of four, linear and nlpi of three, adaptive of two
 }
 
 double largest_difference(const Image& a, const Image& b, bool mirrored = false) {
@@ -99,6 +101,12 @@ TEST(InsideRules, AgreeWhereTheNormalDoesNotTurn) {
                                      picture_of(plan_with(method, "mean", rounded))),
                   0)
             << "one piece has the bits of mean";
+    for_every_rule([&](const std::string& method, const std::string& rule) {
+        // In each of 33 slabs: a last bit of the normal in N.L and in N.H, and half of four parts or two places.
+        EXPECT_LE(largest_difference(picture_of(plan_with(method, rule, rounded)),
+                                     picture_of(plan_with(method, "mean", rounded))),
+                  33 * 4 * 0x1p-15);
+    });
 }
 
 // Colours that bring their opacity may have other fraction bits than opacities: a highlight is as bright.

@@ -21,6 +21,7 @@
 #include <random>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <variant>
 #include <vector>
 
@@ -76,6 +77,11 @@ inline std::vector<KernelCase> kernel_cases() {
             {lit, "volume.bits=16", "shading.gradient=sobel", "camera.projection=perspective"});
         add("pips, analytic, phong, two-sided", {lit, method("pips"), "shading.gradient=analytic",
                                                  "shading.model=phong", "shading.two_sided=true"});
+        for (const char* rule : {"linear", "nlpi", "centroid", "two_point"})
+            for (const char* name : {"pi2d", "pips", "leg"})
+                add(fmt::format("{}, {}", name, rule),
+                    {lit, method(name), "classification.table_size=64", std::string("shading.inside=") + rule,
+                     "classification.order=" + std::string(name == std::string_view("leg") ? "3" : "1")});
         add("pi2d, back to front",
             {unlit, method("pi2d"), "classification.table_size=64", "compositing.form=back_to_front"});
         add("pi1d, opacities", {lit, method("pi1d"), "compositing.form=alpha", "sampling.step=0.6"});
@@ -93,7 +99,7 @@ class KernelChecker {
 
     KernelChecker(const KernelCase& c, std::int64_t target, unsigned seed)
         : c_(c), plan_(c.plan), random_(seed), kernels_(kernels_for(c.plan, c.ways, c.source, target)) {
-        *lit_ = {}, *samples_ = {};
+        *lit_ = {}, *far_ = {}, *light_ = {}, *samples_ = {};
     }
 
     std::vector<KernelCheck> checks() {
@@ -179,6 +185,26 @@ class KernelChecker {
                 "add_ends", [this] { draw_ends(); },
                 [this] { kernels_.add_ends(plan_, count_, ends_, *lit_); },
                 [this] { return sum_difference(); });
+        }
+        if (looks_into_slabs(plan_.inside.rule) && plan_.inside.rule != InsideRule::adaptive) {
+            add(
+                "find_light", [this] { draw_whole_slabs(); },
+                [this] { kernels_.find_light(plan_, count_, *lit_, *light_); },
+                [this] { return light_difference(); });
+            add(
+                "lerp_ends", [this] { draw_ends(), draw_ways(); },
+                [this] { kernels_.lerp_ends(plan_, count_, ends_, lit_->from, light_->way[1], *lit_); },
+                [this] { return lerp_difference(); });
+            if (lights_fade(plan_.inside.rule))
+                add(
+                    "shade_fading", [this] { draw_lit(), draw_two_normals(), draw_parts(); },
+                    [this] { kernels_.shade_fading(plan_, count_, *light_, *far_, *lit_); },
+                    [this] { return fading_difference(); });
+            else
+                add(
+                    "join_places", [this] { draw_lit(), draw_two_normals(), draw_ways(); },
+                    [this] { kernels_.join_places(plan_, count_, *light_, *far_, *lit_); },
+                    [this] { return join_difference(); });
         }
         add(
             "fetch_lit, find_gradients and find_normals", [this] { draw_lit(); },
@@ -299,10 +325,11 @@ class KernelChecker {
     }
     void draw_ends() {
         count_ = 1 + static_cast<int>(below(kSteps * kRays));
+        const Integer largest = std::min<Integer>(plan_.specs[Wire::gradient].format.largest(), 1 << 29);
         for (int i = 0; i < kBatch; ++i) {
             lit_->from.v[i] = static_cast<Word>(below(kSteps * kRays));
             for (Batch& component : ends_.component)
-                component.v[i] = static_cast<Word>(below(1 << 30) - (1 << 29));
+                component.v[i] = static_cast<Word>(up_to(2 * largest) - largest);
         }
     }
     void draw_lit_slabs() {
@@ -321,6 +348,43 @@ class KernelChecker {
             draw_slab(lit_->alpha.v[i], &lit_->color[0].v[i], &lit_->color[1].v[i], &lit_->color[2].v[i]);
         }
         *lit_before_ = *lit_;
+    }
+
+    // Visible slabs as they were classified.
+    void draw_whole_slabs() {
+        draw_inputs();
+        kernels_.classify(plan_, kSteps, *samples_);
+        count_ = 0;
+        for (int i = 0; i < kSteps * kRays; ++i) {
+            if (samples_->alpha.v[i] == 0) continue;
+            for (int end = 0; end < 2; ++end) lit_->input[end].v[count_] = samples_->input.v[i + end * kRays];
+            lit_->length.v[count_] = samples_->length.v[i], lit_->alpha.v[count_] = samples_->alpha.v[i];
+            for (int c = 0; c < 3; ++c) lit_->color[c].v[count_] = samples_->color[c].v[i];
+            ++count_;
+        }
+    }
+    void draw_ways() {
+        for (int i = 0; i < kBatch; ++i) {
+            light_->way[1].v[i] = static_cast<Word>(up_to(one(kWayBits)));
+            light_->share.v[i] = static_cast<Word>(up_to(one(kShareBits)));
+        }
+    }
+    void draw_two_normals() {
+        draw_lit_slabs();
+        *far_ = *lit_;
+        draw_lit_slabs();
+    }
+    // Parts that sum to a slab at most.
+    void draw_parts() {
+        const Integer most = one(plan_.shading.color_fraction);
+        for (int i = 0; i < kBatch; ++i)
+            for (int c = 0; c < 4; ++c) {
+                Integer left = up_to(most);
+                for (auto& part : light_->part) {
+                    const Integer here = up_to(left);
+                    part[c].v[i] = static_cast<Word>(here), left -= here;
+                }
+            }
     }
 
     // ------------------------------------------------------------------------------- the model's lines
@@ -560,6 +624,83 @@ class KernelChecker {
             });
         });
     }
+    std::string light_difference() {
+        using namespace squint::HWY_NAMESPACE;
+        return std::visit(
+            [&]<class M>(const M& method) -> std::string {
+                if constexpr (requires { method.prefix; }) {
+                    return first_of(count_, [&](int i) -> std::string {
+                        const Integer front = lit_->input[0].v[i], back = lit_->input[1].v[i],
+                                      length = lit_->length.v[i];
+                        if (lights_at_places(plan_.inside.rule)) {
+                            const auto places =
+                                places_of_light(plan_.inside, method.prefix, front, back, length);
+                            for (const auto& [what, model, found] :
+                                 {std::tuple{"near", places.near, light_->way[0].v[i]},
+                                  {"far", places.far, light_->way[1].v[i]},
+                                  {"share", places.share, light_->share.v[i]}})
+                                if (auto text = differs(what, i, model, found); !text.empty()) return text;
+                            return {};
+                        }
+                        const Slab<Integer> slab{three(lit_->color, i), lit_->alpha.v[i]};
+                        FadingLight<Integer> fades{};
+                        if constexpr (requires { method.fades; })
+                            fades = fading_light(method, front, back, length, slab);
+                        else if constexpr (!M::kPremultiplied)
+                            fades = fading_light_of_quarters(plan_.inside, method, front, back, length, slab);
+                        for (int k = 0; k < fades.count; ++k)
+                            for (std::size_t c = 0; c < 4; ++c)
+                                if (auto text = differs("part", i, fades.part[static_cast<std::size_t>(k)][c],
+                                                        light_->part[k][c].v[i]);
+                                    !text.empty())
+                                    return text;
+                        return differs("end", i, fades.end, light_->way[1].v[i]);
+                    });
+                }
+                return "the method has no prefix sums";
+            },
+            plan_.method);
+    }
+    std::string lerp_difference() {
+        using namespace squint::HWY_NAMESPACE;
+        return first_of(count_, [&](int i) {
+            L3 front, back;
+            for (std::size_t a = 0; a < 3; ++a) {
+                const Word* at = ends_.component[a].v + lit_->from.v[i];
+                front[a] = at[0], back[a] = at[kRays];
+            }
+            const L3 model = gradient_up_to(plan_.inside, front, back, Integer{light_->way[1].v[i]});
+            return first_of(3, [&](int a) {
+                return differs("gradient", i, model[static_cast<std::size_t>(a)], lit_->gradient[a].v[i]);
+            });
+        });
+    }
+    std::string fading_difference() {
+        using namespace squint::HWY_NAMESPACE;
+        return first_of(count_, [&](int i) {
+            RayWords<Integer> ray{};
+            std::array<L3, 2> normal{three(lit_before_->normal, i), three(far_->normal, i)};
+            share_normal(normal[0], normal[1]);
+            FadingLight<Integer> fades{plan_.inside.rule == InsideRule::linear ? 2 : 4, {}, 0};
+            for (std::size_t k = 0; k < 4; ++k)
+                for (std::size_t c = 0; c < 4; ++c) fades.part[k][c] = light_->part[k][c].v[i];
+            L3 color;
+            shade_fading(plan_.shading, ray, normal, {0, 0}, fades, color);
+            return first_of(3, [&](int c) {
+                return differs("color", i, color[static_cast<std::size_t>(c)], lit_->color[c].v[i]);
+            });
+        });
+    }
+    std::string join_difference() {
+        using namespace squint::HWY_NAMESPACE;
+        return first_of(count_, [&](int i) {
+            const L3 color = light_of_places(plan_.inside, three(lit_before_->color, i),
+                                             three(far_->color, i), Integer{light_->share.v[i]});
+            return first_of(3, [&](int c) {
+                return differs("color", i, color[static_cast<std::size_t>(c)], lit_->color[c].v[i]);
+            });
+        });
+    }
     std::string shade_difference() {
         using namespace squint::HWY_NAMESPACE;
         return first_of(count_, [&](int i) -> std::string {
@@ -588,7 +729,9 @@ class KernelChecker {
     EndGradients ends_{};
     Row known_before_{};
     std::unique_ptr<LitSamples> lit_ = std::make_unique<LitSamples>(),
-                                lit_before_ = std::make_unique<LitSamples>();
+                                lit_before_ = std::make_unique<LitSamples>(),
+                                far_ = std::make_unique<LitSamples>();
+    std::unique_ptr<SlabLight> light_ = std::make_unique<SlabLight>();
     int count_ = 0;
 };
 

@@ -186,13 +186,12 @@ Case draw_case(unsigned seed, const std::string& preset) {
     scene.classification = {};
     ClassificationSettings& method = scene.classification;
     method.method = draw.one_of({Method::pc, Method::pc_mid, draw.any_of<Method>(), draw.any_of<Method>()});
-    if (draw.once_in(2))  // the last two run in the model
-        scene.shading.inside =
-            draw.one_of({InsideRule::mean, InsideRule::front, InsideRule::middle, InsideRule::middle,
-                         InsideRule::adaptive, InsideRule::adaptive, InsideRule::linear, InsideRule::nlpi});
-    if (scene.shading.inside == InsideRule::adaptive && method.method != Method::leg)
-        method.method = Method::pips;
-    if (scene.shading.inside && lights_fade(*scene.shading.inside)) method.method = Method::pi2d;
+    if (draw.once_in(2)) scene.shading.inside = draw.any_of<InsideRule>();
+    if (const auto& rule = scene.shading.inside) {  // a method that has it
+        const bool by_parts = method.method == Method::leg || method.method == Method::pips;
+        if (rule == InsideRule::adaptive && !by_parts) method.method = Method::pips;
+        if (lights_fade(*rule) && !by_parts) method.method = draw.one_of({Method::pi2d, Method::pips});
+    }
     if (scene.sampling.interpolation == InterpolationRule::nearest && method.method != Method::pc_mid)
         method.method = Method::pc;  // slab methods are refused there
     method.order = static_cast<int>(method.method == Method::leg ? draw.between(2, 4) : draw.between(1, 5));
@@ -233,6 +232,9 @@ std::vector<Share> shares() {
         {"normals", [](const Plan& p) { return p.scene.output.normals && p.lit; }},
         {"gradients from samples", [](const Plan& p) { return p.gradient_from_samples(); }},
         {"light at the middle", [](const Plan& p) { return p.inside.rule == InsideRule::middle; }},
+        {"light in pieces", [](const Plan& p) { return p.inside.rule == InsideRule::adaptive; }},
+        {"light between two gradients",
+         [](const Plan& p) { return lights_fade(p.inside.rule) || lights_at_places(p.inside.rule); }},
         {"light that fades in", [](const Plan& p) { return p.gradient.fades; }},
         {"gooch", [](const Plan& p) { return p.lit && p.shading.model == ShadingModel::gooch; }},
         {"straight colours", [](const Plan& p) { return p.compositing.form == CompositingForm::straight; }},

@@ -38,9 +38,10 @@ InsideStage stage_of(bool rounds = true) {
     }
     s.most_apart = {2 << 23, 2 << 23, 2 << 23}, s.limit = {255 << 23, 255 << 23, 255 << 23};
     s.highest_input = 4095 << 8;
-    s.one_alpha = kOne, s.largest_lit = 2 * kOne - 1;
+    s.one_alpha = kOne, s.lit = true, s.largest_color = 2 * kOne - 1;
+    s.most_light = s.one_alpha * s.largest_color;
     s.to_part = Rescale(30, unsigned_spec(1, 15)), s.to_whole = Rescale(15, unsigned_spec(1, 15));
-    if (!rounds) s.visit([](Rescale& r) { r.active = false; });
+    if (!rounds) s.visit([](auto& rescale_or_table) { rescale_or_table.active = false; });
     return s;
 }
 
