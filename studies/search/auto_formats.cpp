@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kTermination = 0x1p-12;
 constexpr int kMostViews = 8;
-constexpr std::int64_t kMostRays = 6000;  // of all certificates of a set of formats
+constexpr std::int64_t kMostRays = 3000;  // of all certificates of a set of formats
 // Of the budget, where rays are left out: others may be a little worse.
 constexpr double kOfSomeRays = 0.85;
 constexpr int kRaises = 12, kTakenBack = 3;
