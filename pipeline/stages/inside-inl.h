@@ -155,11 +155,15 @@ HWY_INLINE LightPlaces<W> places_of_light(const InsideStage& s, const PrefixLook
     const EntryPosition<W> start = row_at(cut.front_input);
     const Wide<W> all = depth_between(p, start, row_at(cut.end_input)), some = divisor<W>(all);
     const auto is_short = absolute(cut.end_input - cut.front_input) < constant<W>(kLeastSpan);
+    // In so few bits that the products of its remainders fit a double.
+    constexpr int kBits = 10;
+    Rescale to_share = s.to_share;
+    to_share.shift = -kBits, to_share.width = kBits + 1;
     const auto share_at = [&](int part) {
         const Wide<W> up_to =
             depth_between(p, start, row_at(input_between(s, cut.front_input, cut.end_input, part, 2)));
-        return select(is_short, constant<W>(kOne / kQuarters * part),
-                      min(divide(up_to, some, s.to_share), one));
+        const W share = min(divide(up_to, some, to_share), constant<W>(std::int64_t{1} << kBits));
+        return select(is_short, constant<W>(kOne / kQuarters * part), shift_left(share, kShareBits - kBits));
     };
     const std::array<W, 3> y{share_at(1), share_at(2), share_at(3)};
     const auto square = [&](W share) {
