@@ -177,7 +177,7 @@ InsideRule inside_rule(Plan& plan) {
             lights_fade(*asked) ? "of where light lies in a slab" : "for parts of a slab", allowed,
             lights_fade(*asked) ? "\"pi2d\", " : ""));
     }
-    return asked.value_or(InsideRule::mean);
+    return asked.value_or(InsideRule::two_point);  // decision 0051
 }
 
 // Slabs of methods that know walls; as printed, one way is enough.

@@ -123,6 +123,12 @@ TEST(InsideRules, LightColoursThatAreFinerOrCoarserThanOpacities) {
         }
 }
 
+TEST(InsideRules, AreTwoPlacesByDefault) {
+    for (const char* method : kMethods)
+        EXPECT_EQ(plan_with(method, "", {}).inside.rule, InsideRule::two_point) << method;
+    EXPECT_EQ(plan_with("pc", "", {}).inside.rule, InsideRule::front);
+}
+
 // Zero gradients, at both ends and between: ambient light alone.
 TEST(InsideRules, GiveEvenMatterAmbientLight) {
     for_every_rule([](const std::string& method, const std::string& rule) {
