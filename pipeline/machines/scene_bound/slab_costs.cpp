@@ -1,0 +1,277 @@
+#include "pipeline/machines/scene_bound/slab_costs.h"
+
+#include "core/portable_math.h"
+#include "pipeline/machines/certificate.h"
+#include "pipeline/machines/certificate/payers.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+namespace squint {
+namespace {
+
+constexpr int kMostBins = 4096;  // where rows need no more
+constexpr int kErrors = 9;
+
+double opacity_of(double depth) {
+    return -portable::expm1(-depth);
+}
+float not_less(double x) {
+    const auto y = static_cast<float>(x);
+    return static_cast<double>(y) < x ? std::nextafter(y, std::numeric_limits<float>::infinity()) : y;
+}
+
+/// The steepest that opacity changes with an input in [low, high], per entry: of a full slab, and of any shorter one.
+struct Steepness {
+    double full = 0, shorter = 0;
+};
+Steepness steepness(const Function& f, double low, double high) {
+    Steepness most;
+    const int first = std::clamp(static_cast<int>(low), 0, std::max(f.last() - 1, 0));
+    for (int i = first; i < f.last() && (i == first || i < high); ++i) {
+        const double from = std::max(low, static_cast<double>(i)), to = std::min(high, i + 1.0);
+        const double slope = f.slope(Function::depth, from, from);
+        const double least = std::min(f.at(Function::depth, from), f.at(Function::depth, to));
+        most.full = std::max(most.full, slope * portable::exp(-least));
+        // l exp(-l tau) at its greatest l <= 1.
+        most.shorter = std::max(most.shorter, slope * (least < 1 ? portable::exp(-least) : 0.36788 / least));
+    }
+    return most;
+}
+
+/// How far two neighbouring words of a table's column are from the values that they stand for.
+struct RowErrors {
+    double most = 0;
+    bool nothing = true;  // both words are zero
+};
+
+}  // namespace
+
+SlabCosts::SlabCosts(const Plan& plan, const SampleErrors& errors, double reach)
+    : errors_(errors), reach_(reach) {
+    const Function function(plan);
+    const EntryLookup& e = std::get<PostClassification>(plan.method).entries;
+    const int last = function.last();
+    int bits = e.row_bits;
+    while (bits < e.row_bits + 4 && last << (bits + 1) <= kMostBins) ++bits;
+    per_entry_ = std::ldexp(1.0, bits);
+    const int count = std::max(last << bits, 1);
+    for (int i = 0; i < count; ++i)
+        bin_.push_back(bin_at(plan, function, i / per_entry_, std::min((i + 1) / per_entry_, 1.0 * last)));
+    for (int i = 0; i <= last; ++i) flat_.push_back(bin_at(plan, function, i, i));
+    costing_.push_back(0), visible_.push_back(0);
+    for (const InputBin& bin : bin_) {
+        costing_.push_back(costing_.back() + (bin.costs() || bin.opacity > 0));
+        visible_.push_back(visible_.back() + bin.visible);
+    }
+    for (int i = 0; i < kErrors; ++i) error_.push_back(i < 2 ? 0 : std::ldexp(reach, i + 1 - kErrors));
+    const int levels = std::bit_width(static_cast<unsigned>(count));
+    table_.assign(kErrors, std::vector<std::vector<Costs>>(static_cast<std::size_t>(levels)));
+    for (std::size_t m = 0; m < kErrors; ++m) {
+        auto& level = table_[m];
+        for (InputBin bin : bin_) {
+            if (m == 0) bin.wall = bin.last_wall = 0;
+            level[0].push_back(costs_of(bin, error_[m]));
+        }
+        for (std::size_t l = 1; l < level.size(); ++l) {
+            const std::size_t half = std::size_t{1} << (l - 1);
+            level[l] = level[l - 1];
+            for (std::size_t i = 0; i + half < level[l].size(); ++i) level[l][i].take(level[l - 1][i + half]);
+        }
+    }
+}
+
+InputBin SlabCosts::bin_at(const Plan& plan, const Function& f, double from, double to) const {
+    const EntryLookup& e = std::get<PostClassification>(plan.method).entries;
+    const bool point = from == to;
+    const auto highest = static_cast<double>(f.last());
+    const double low = std::max(from - reach_, 0.0), high = std::min(to + reach_, highest);
+    // What the table's words and its straight lines are off by, of 1.0.
+    const double rows = std::ldexp(1.0, e.row_bits);
+    const auto row = static_cast<std::int64_t>(from * rows),
+               next = std::min<std::int64_t>(point ? row : row + 1, e.table.rows() - 1);
+    const int weight_bits = e.input_fraction - e.row_bits;
+    const auto errors_of = [&](int column, int fraction, const auto& exact) {
+        RowErrors errors;
+        for (const std::int64_t r : {row, next}) {
+            const auto word = static_cast<double>(e.table.word(r, column));
+            const double place = std::min(static_cast<double>(r) / rows, highest);
+            errors.most = std::max(errors.most, std::abs(std::ldexp(word, -fraction) - exact(place)));
+            errors.nothing = errors.nothing && word == 0;
+        }
+        return errors;
+    };
+    const auto alpha_at = [&](double place) { return opacity_of(f.at(Function::depth, place)); };
+    const RowErrors alpha =
+        errors_of(EntryLookup::alpha, e.to_alpha.shift + e.alpha_fraction - weight_bits, alpha_at);
+    // A row itself passes through, where no bits of it are dropped.
+    const auto unit = [&](const Rescale& rescale, int fraction) {
+        return point && rescale.shift <= weight_bits ? 0 : unit_of(rescale) * std::ldexp(1.0, -fraction);
+    };
+    const double alpha_unit = alpha.nothing ? 0 : unit(e.to_alpha, e.alpha_fraction);
+    const double start = static_cast<double>(row) / rows, end = static_cast<double>(next) / rows;
+    const double rise =
+                     std::abs(f.at(Function::depth, std::min(end, highest)) - f.at(Function::depth, start)),
+                 least =
+                     std::min(f.at(Function::depth, std::min(end, highest)), f.at(Function::depth, start));
+    const double bend = rise * rise / 8 * portable::exp(-least);
+    double color = 0, color_steep = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+        const RowErrors of = errors_of(static_cast<int>(c), e.table_color_fraction,
+                                       [&](double place) { return f.at(c, place); });
+        color = std::max(color, of.most);
+        color_steep = std::max(color_steep, f.slope(c, low, high));
+    }
+    const double color_unit = unit(e.to_color, e.color_fraction);
+
+    InputBin bin;
+    const Reach depths = f.over(Function::depth, from, to);
+    const double off = alpha.most + alpha_unit + bend;
+    const double most = std::min(opacity_of(depths.high) + off, 1.0);
+    bin.visible = !alpha.nothing;
+    bin.opacity = bin.visible ? std::max(opacity_of(depths.low) - off - 0x1p-40, 0.0) : 0;
+    const Steepness steep = steepness(f, low, high);
+    const double seen = bin.visible ? most : 0;
+    bin.steep = steep.full + seen * color_steep;
+    bin.last_steep = steep.shorter + seen * color_steep;
+    const auto add_color = [&](Shares& shares) {
+        shares[index_of(Wire::table_color)] += seen * color;
+        shares[index_of(Wire::slab_ratio)] += seen * color_unit;
+    };
+    bin.of_table[index_of(Wire::table_alpha)] = alpha.most;
+    bin.of_table[index_of(Wire::slab_alpha)] = alpha_unit;
+    bin.of_table[kRowsPay] = bend;
+    add_color(bin.of_table);
+    bin.table = bin.of_table.sum();
+
+    // A ray's last slab takes its opacity from its depth; a length within half a last bit of one is one.
+    const double deepest = f.over(Function::depth, low, high).high;
+    const Function::Opaque near = f.opaque(low, high);
+    if (deepest > 0 || near.any) {
+        const OpacityUnit& table = e.opacity;
+        const auto segment = std::min<std::int64_t>(static_cast<std::int64_t>(from), e.last_segment);
+        double matter = 0;
+        for (std::int64_t i = std::max<std::int64_t>(segment, 0);
+             i <= std::min<std::int64_t>(segment + 1, f.last()); ++i)
+            matter = std::max(
+                matter, std::abs(std::ldexp(static_cast<double>(e.matter.word(i, EntryLookup::extinction)),
+                                            -e.extinction_fraction) -
+                                 f.at(Function::depth, static_cast<double>(i))));
+        Shares& last = bin.of_last_table;
+        last = greatest(bin.of_table, Shares::one(index_of(Wire::table_extinction), matter));
+        last[index_of(Wire::slab_depth)] +=
+            (unit_of(e.to_depth) + rounding_of(1e-300, e.to_shorter.rounding)) *
+            std::ldexp(1.0, -table.depth_fraction);
+        last[index_of(Wire::slab_alpha)] =
+            std::max(last[index_of(Wire::slab_alpha)],
+                     unit_of(table.to_alpha) * std::ldexp(1.0, -table.alpha_fraction)) +
+            std::ldexp(1.0, -2 * table.row_bits - 3) + std::ldexp(1.0, -table.alpha_fraction - 3) +
+            portable::exp(-std::ldexp(table.rows.rows() - 2, -table.row_bits));
+        last[index_of(Wire::length)] += rounding_of(1e-300, plan.location.length.rounding) *
+                                        std::ldexp(1.0, -e.length_fraction) * deepest;
+        bin.last_table = last.sum();
+    }
+
+    // A wall: the word is opaque and the input without rounding is not, or the other way about.
+    if (near.any && !near.all) {
+        double least_there = std::numeric_limits<double>::infinity();
+        for (int i = static_cast<int>(std::ceil(low)); i <= std::min(static_cast<int>(high), f.last()); ++i)
+            if (f.opaque(i, i).any) least_there = std::min(least_there, f.at(Function::depth, i));
+        if (std::isinf(least_there)) least_there = 0;
+        bin.wall = portable::exp(-least_there), bin.last_wall = 1;
+    }
+    if (near.all) bin.opacity = f.opaque(from, to).all ? 1 : bin.opacity;
+    return bin;
+}
+
+Costs SlabCosts::costs_of(const InputBin& bin, double error) {
+    Costs costs;
+    for (std::size_t k = 0; k < kKnots.size(); ++k)
+        costs.at[k] =
+            not_less((bin.steep * error + bin.table + bin.wall) * (1 + 0x1p-40) - bin.opacity * kKnots[k]);
+    costs.at.back() = not_less((bin.last_steep * error + bin.last_table + bin.last_wall) * (1 + 0x1p-40));
+    return costs;
+}
+
+const InputBin* SlabCosts::flat_bin(const CellValues& cell) const {
+    if (!cell.flat() || errors_.scaled || (errors_.two_products && cell.high != 0)) return nullptr;
+    return &flat_[std::min(static_cast<std::size_t>(cell.low), flat_.size() - 1)];
+}
+
+SlabCosts::Bins SlabCosts::bins_of(const CellValues& cell, bool reached) const {
+    const double beyond = reached ? reach_ : errors_.beyond();
+    const int most = bins() - 1;
+    const double low = (cell.low * errors_.scale - beyond) * per_entry_,
+                 high = (cell.high * errors_.scale + beyond) * per_entry_;
+    const int first = std::clamp(static_cast<int>(std::floor(low)), 0, most);
+    return {first, std::clamp(static_cast<int>(std::ceil(high)) - 1, first, most)};
+}
+
+Costs SlabCosts::greatest_of(std::size_t error, const Bins& bins) const {
+    const auto count = static_cast<unsigned>(bins.last - bins.first + 1);
+    const int level = std::bit_width(count) - 1;
+    const std::vector<Costs>& row = table_[error][static_cast<std::size_t>(level)];
+    Costs all = row[static_cast<std::size_t>(bins.first)];
+    all.take(row[static_cast<std::size_t>(bins.last + 1 - (1 << level))]);
+    return all;
+}
+
+Costs SlabCosts::of(const CellValues& cell) const {
+    if (const InputBin* flat = flat_bin(cell)) {
+        InputBin bin = *flat;
+        bin.wall = bin.last_wall = 0;
+        return costs_of(bin, 0);
+    }
+    const double error = errors_.of(cell);
+    const Bins bins = bins_of(cell, error > 0);
+    if (costing_[static_cast<std::size_t>(bins.last) + 1] == costing_[static_cast<std::size_t>(bins.first)])
+        return {};
+    if (!(error > 0)) return greatest_of(0, bins);
+    std::size_t m = 2;
+    while (m + 1 < error_.size() && error_[m] < error) ++m;
+    // Convex in the error as well: at most straight between two.
+    const auto way = static_cast<float>((error - error_[m - 1]) / (error_[m] - error_[m - 1]));
+    Costs all = greatest_of(m - 1, bins);
+    const Costs far = greatest_of(m, bins);
+    for (std::size_t i = 0; i < all.at.size(); ++i) {
+        const float step = far.at[i] - all.at[i];
+        all.at[i] += way * step + (std::abs(all.at[i]) + std::abs(far.at[i])) * 0x1p-21f;
+    }
+    return all;
+}
+
+bool SlabCosts::visible(const CellValues& cell) const {
+    if (const InputBin* flat = flat_bin(cell)) return flat->visible;
+    const Bins bins = bins_of(cell, false);
+    return visible_[static_cast<std::size_t>(bins.last) + 1] !=
+           visible_[static_cast<std::size_t>(bins.first)];
+}
+
+SlabCosts::Decided SlabCosts::decided(const CellValues& cell, double v, bool last) const {
+    Decided best;
+    const double error = errors_.of(cell);
+    double most = -std::numeric_limits<double>::infinity();
+    const auto ask = [&](const InputBin& bin, int index) {
+        const double wall = error > 0 ? (last ? bin.last_wall : bin.wall) : 0,
+                     steep = last ? bin.last_steep : bin.steep, table = last ? bin.last_table : bin.table;
+        const double cost = steep * error + table + wall, opacity = last ? 0 : bin.opacity;
+        if (!(cost - opacity * v > most)) return;
+        most = cost - opacity * v;
+        best = {cost, opacity, last ? bin.of_last_table : bin.of_table, index};
+        best.shares.add(errors_.shares_of(cell), steep);
+        best.shares[kWallsPay] += wall;
+    };
+    if (const InputBin* flat = flat_bin(cell)) {
+        ask(*flat, static_cast<int>(cell.low * per_entry_));
+        return best;
+    }
+    const Bins bins = bins_of(cell, error > 0);
+    if (costing_[static_cast<std::size_t>(bins.last) + 1] == costing_[static_cast<std::size_t>(bins.first)])
+        return best;
+    for (int i = bins.first; i <= bins.last; ++i) ask(bin_[static_cast<std::size_t>(i)], i);
+    return best;
+}
+
+}  // namespace squint

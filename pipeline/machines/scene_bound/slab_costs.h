@@ -1,0 +1,92 @@
+// What a slab may add to the error of a pixel, by the values that its sample may have.
+//
+// With v the most that all behind a slab can add at T = 1, the slab and what lies behind it add at most
+//
+//     v' = max over the inputs i that it may have of  a_i + (1 - alpha_i) v,      h(v) = v' - v = max of a_i - alpha_i v
+//
+// where a_i is what the slab's own opacity and colour are off by.  h is convex in v: kept at a few v (kKnots),
+// it is at most straight between them.
+#pragma once
+
+#include "pipeline/machines/certificate/function.h"
+#include "pipeline/machines/scene_bound/sample_errors.h"
+#include "pipeline/plan/plan.h"
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+namespace squint {
+
+inline constexpr std::array<double, 7> kKnots{0, 1.0 / 512, 1.0 / 128, 1.0 / 48, 1.0 / 16, 0.25, 1};
+
+/// h at every knot; then a, where the slab is its ray's last and may be short.
+struct Costs {
+    std::array<float, kKnots.size() + 1> at{};
+
+    float last() const { return at.back(); }
+    void take(const Costs& other) {
+        for (std::size_t i = 0; i < at.size(); ++i) at[i] = at[i] < other.at[i] ? other.at[i] : at[i];
+    }
+    /// h(v), 0 <= v <= 1.
+    double more(double v) const {
+        std::size_t k = 1;
+        while (k + 1 < kKnots.size() && kKnots[k] < v) ++k;
+        const double way = (v - kKnots[k - 1]) / (kKnots[k] - kKnots[k - 1]);
+        return static_cast<double>(at[k - 1]) * (1 - way) + static_cast<double>(at[k]) * way;
+    }
+};
+
+/// Inputs between two places of the function, closer than rows of its table.
+struct InputBin {
+    double steep = 0, table = 0, wall = 0;  // a = steep e + table, + wall where e > 0
+    double opacity = 0;                     // the least that a word there can have
+    double last_steep = 0, last_table = 0, last_wall = 0;
+    bool visible = false;  // a word there may have an opacity above zero
+    Shares of_table, of_last_table;
+    bool costs() const { return steep > 0 || table > 0 || wall > 0 || last_table > 0 || last_wall > 0; }
+};
+
+/// Post-classification's costs.
+class SlabCosts {
+  public:
+    /// `reach`: the most that an input is off by, in entries.
+    SlabCosts(const Plan& plan, const SampleErrors& errors, double reach);
+
+    /// Of a slab whose sample lies in a cell of these values, or would without rounding.
+    Costs of(const CellValues& cell) const;
+    /// Whether a word whose sample lies in such a cell can be seen.
+    bool visible(const CellValues& cell) const;
+
+    /// A bin that decides: what it costs at v, and how opaque it is.
+    struct Decided {
+        double cost = 0, opacity = 0;
+        Shares shares;
+        int bin = -1;
+    };
+    Decided decided(const CellValues& cell, double v, bool last) const;
+
+    int bins() const { return static_cast<int>(bin_.size()); }
+    double entry_of(int bin) const { return bin / per_entry_; }
+
+  private:
+    struct Bins {
+        int first = 0, last = 0;
+    };
+    /// The bins of a cell's values; `reached`: and of what an error leads to from there.
+    Bins bins_of(const CellValues& cell, bool reached) const;
+    const InputBin* flat_bin(const CellValues& cell) const;
+    InputBin bin_at(const Plan& plan, const Function& function, double from, double to) const;
+    static Costs costs_of(const InputBin& bin, double error);
+    Costs greatest_of(std::size_t error, const Bins& bins) const;
+
+    SampleErrors errors_;
+    double reach_ = 0, per_entry_ = 1;
+    std::vector<InputBin> bin_, flat_;    // flat_: of whole entries, for cells that hold nothing else
+    std::vector<int> costing_, visible_;  // how many bins before this one
+    // The greatest costs of 2^l bins from each on, for each error: none, above none, then doubling up to reach_.
+    std::vector<double> error_;
+    std::vector<std::vector<std::vector<Costs>>> table_;
+};
+
+}  // namespace squint
