@@ -1,6 +1,7 @@
 // squint plan: what a scene exercises, what is left out, and why.
 #include "cli/common.h"
 #include "cli/verb.h"
+#include "pipeline/machines/scene_bound.h"
 #include "pipeline/plan_record.h"
 #include "pipeline/record.h"
 
@@ -14,7 +15,7 @@ namespace {
 
 struct PlanArguments {
     SceneArguments scene;
-    bool json = false, brief = false;
+    bool json = false, brief = false, bound = false;
 };
 
 using Rows = std::vector<std::vector<std::string>>;
@@ -80,9 +81,33 @@ std::string brief_text(const Plan& plan) {
     return text;
 }
 
+std::string bound_text(const SceneBound& b) {
+    std::string text = fmt::format(
+        "bound, proven: no pixel of any view, in any projection or size, is more than {:.4g} LSB8 from the "
+        "picture without rounding\n"
+        "  by entries {:.4g}, by blocks {:.4g}, by beams {:.4g} ({} beams; rays of {} samples at most)\n",
+        b.most, b.by_entries, b.by_blocks, b.by_beams, b.beams, b.samples);
+    if (!b.hopeless.empty()) text += "  hopeless: " + b.hopeless + "\n";
+    text += fmt::format("  who pays, on the beam that decides: {} most\n", payer_name(b.payer));
+    for (int p = 0; p < Shares::kMost; ++p)
+        if (b.shares[p] >= b.most / 1000)
+            text += fmt::format("    {:<20} {:>8.3g}\n", payer_name(p), b.shares[p]);
+    text += fmt::format("  where: cells {} {} {} to {} {} {} pay {:.3g} of it, at entry {:.4g}\n",
+                        b.block_first[0], b.block_first[1], b.block_first[2], b.block_last[0],
+                        b.block_last[1], b.block_last[2], b.block_share, b.entry);
+    return text;
+}
+
 int run(const PlanArguments& a) {
     const Plan plan = plan_of(a.scene);
-    if (a.json) return print_json(json_of_plan(plan)), kDone;
+    std::optional<SceneBound> bound;
+    if (a.bound) bound = bound_scene(plan);
+    if (a.json) {
+        nlohmann::ordered_json record = json_of_plan(plan);
+        if (bound) record["bound"] = json_of(*bound);
+        return print_json(record), kDone;
+    }
+    if (bound) return print(bound_text(*bound)), kDone;
     const Volume& v = *plan.volume;
     const Memory memory = memory_of(plan, {});
     std::string text =
@@ -123,6 +148,7 @@ int run(const PlanArguments& a) {
 void flags(Flags& f, PlanArguments& a) {
     add_scene(f, a.scene);
     f.add("--brief", a.brief, "A line a stage: its wires and their formats");
+    f.add("--bound", a.bound, "Prove how far any pixel of any view can be from the picture without rounding");
     add_json_flag(f, a.json);
 }
 
