@@ -253,9 +253,10 @@ class Slabs {
         if (inside.rule == InsideRule::middle) return light_with(gradient_between(front, back, 1, 1), slab);
         const std::array<W, 3>&at_front = gradient_of(front), &at_back = gradient_of(back);
         if constexpr (requires { method_.prefix; }) {
-            if (lights_fade(inside.rule))
-                return light_fading(at_front, at_back, fading_light_of(front.input, back.input, length, slab),
-                                    slab);
+            if constexpr (requires { method_.fades; } || !M::kPremultiplied)
+                if (lights_fade(inside.rule))
+                    return light_fading(at_front, at_back,
+                                        fading_light_of(front.input, back.input, length, slab), slab);
             if (lights_at_places(inside.rule))
                 return light_places(at_front, at_back, front.input, back.input, length, slab);
         }

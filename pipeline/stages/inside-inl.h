@@ -306,13 +306,11 @@ struct FadingNormals {
 template <class W>
 HWY_INLINE FadingNormals<W> fading_normals(const GradientStage& s,
                                            const std::array<std::array<W, 3>, 2>& gradient) {
-    FadingNormals<W> ends;
-    for (std::size_t end = 0; end < 2; ++end) {
-        ends.normal[end] = normalise(s, gradient[end]);
-        ends.certain[end] = s.fades ? confidence(s, gradient[end]) : constant<W>(0);
-    }
-    share_normal(ends.normal[0], ends.normal[1]);
-    return ends;
+    const W zero = constant<W>(0);
+    std::array<W, 3> front = normalise(s, gradient[0]), back = normalise(s, gradient[1]);
+    share_normal(front, back);
+    return {{front, back},
+            {s.fades ? confidence(s, gradient[0]) : zero, s.fades ? confidence(s, gradient[1]) : zero}};
 }
 
 /// The light of a slab's pieces, front to back, joined to one colour.
