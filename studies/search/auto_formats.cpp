@@ -98,7 +98,7 @@ AutoFormats choose_formats(Scene& scene, const std::shared_ptr<const Volume>& vo
     const double budget = scene.precision.budget;
     if (scene.precision.guarantee == Guarantee::scene)
         throw InputError(
-            fmt::format("{}: found \"scene\"; a bound of every view is not built yet; allowed: "
+            fmt::format("{}: found \"scene\"; formats are not chosen by plan --bound yet; allowed: "
                         "\"pictures\"",
                         at(scene, "precision.guarantee")));
     if (const SamplingSettings none;
