@@ -269,12 +269,16 @@ inline Bounded cuts_between(const std::array<Bounded, 3>& front, const std::arra
     if (!(f.off < f.length) || !(b.off < b.length)) return unsure(0, kMostCuts);
     double dot = 0;
     for (std::size_t a = 0; a < 3; ++a) dot += in_double(front[a].v) * in_double(back[a].v);
-    const double angle = std::acos(std::clamp(dot / (f.length * b.length), -1.0, 1.0)),
-                 off = std::asin(f.off / f.length) + std::asin(b.off / b.length) + 1e-7;
-    const auto cuts = [](double a) {
-        return a > std::acos(23.0 / 32) ? 2 : a > std::acos(31.0 / 32) ? 1 : 0;
-    };
-    return unsure(cuts(angle - off), cuts(angle + off));
+    // Cosines of the angle less and more what both may turn by: asin(e / |g|) each.
+    const double sin_f = f.off / f.length, sin_b = b.off / b.length, cos_f = std::sqrt(1 - sin_f * sin_f),
+                 cos_b = std::sqrt(1 - sin_b * sin_b);
+    const double sine = sin_f * cos_b + cos_f * sin_b, cosine = cos_f * cos_b - sin_f * sin_b;
+    const double between = std::clamp(dot / (f.length * b.length), -1.0, 1.0),
+                 across = std::sqrt(1 - between * between);
+    const double nearest = cosine <= between ? 1 : between * cosine + across * sine,
+                 farthest = cosine <= -between ? -1 : between * cosine - across * sine;
+    const auto cuts = [](double c) { return c < 23.0 / 32 ? 2 : c < 31.0 / 32 ? 1 : 0; };
+    return unsure(cuts(nearest + 1e-7), cuts(farthest - 1e-7));
 }
 
 }  // namespace squint

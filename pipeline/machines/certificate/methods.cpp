@@ -166,12 +166,12 @@ Slab<Bounded> classify(const BoundedPowerSeries& m, const Bounded& front, const 
         const double steep = f.slope(Function::depth, low, high);
         const double by_front = l * steep * from_off / 2, by_back = l * steep * to_off / 2,
                      by_length = l_off * depths.high;
-        const double shift = by_front + by_back + by_length, depth = -std::log1p(-here.alpha);
+        const double shift = by_front + by_back + by_length, depth = -portable::log1p(-here.alpha);
         const Reach moved{opacity(std::max(depth - shift, std::max(l - l_off, 0.0) * depths.low)),
                           opacity(std::min(depth + shift, std::min(l + l_off, 1.0) * depths.high))};
         to_ends(alpha_error, std::max(moved.from(here.alpha), 0.0), by_front, by_back, by_length);
         // x dK = int (c - K) dtau + int tau dc.
-        const double mean = l > 0 ? depth / l : -std::log1p(-seen.alpha),
+        const double mean = l > 0 ? depth / l : -portable::log1p(-seen.alpha),
                      least = std::max(mean - steep * (from_off + to_off) / 2, depths.low);
         const double outside = std::numeric_limits<double>::infinity();
         // The share of the depth that the ends' displacement adds or takes.
