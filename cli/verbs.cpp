@@ -1,4 +1,4 @@
-// The list of verbs, in the order of help within a heading.  Each is defined in cli/NAME.cpp.
+// The list of verbs, in the order of help within a heading.  Each is defined in a file of its name.
 #include "cli/verb.h"
 
 #define SQUINT_VERBS(VERB) \

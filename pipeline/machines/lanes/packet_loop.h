@@ -371,8 +371,8 @@ class PacketLoop {
             }
         }
         find_gradients(count, w_.pieces);
-        if (const int bits = bits_of_pieces(plan_.inside, plan_.gradient))
-            lengthen_gradients(count, bits, w_.pieces);
+        if (const int as_sums = bits_of_pieces(plan_.inside, plan_.gradient))
+            lengthen_gradients(count, as_sums, w_.pieces);
         shade(count, w_.pieces);
         kernels_.join(plan_, w_.pieces.color, w_.pieces.alpha, bits, slabs, at);
         // The normal of a slab is that of its first visible piece.
