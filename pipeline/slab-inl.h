@@ -214,7 +214,8 @@ class Slabs {
         Slab<W> slab = classify(method_, front.input, back.input, length);
         const W zero = constant<W>(0),
                 twice = plan_.walls.looks_twice ? wants_second_look(front, back, slab) : zero;
-        const Slab<W> looked = any(zero < twice) ? look_twice(front, back, length) : slab;
+        const bool looks = plan_.walls.looks_twice && any(zero < twice);
+        const Slab<W> looked = looks ? look_twice(front, back, length) : slab;
         if (plan_.lit && any((zero < slab.alpha) & (twice == zero))) light(front, back, length, slab);
         for (std::size_t c = 0; c < 3; ++c)
             slab.color[c] = select(zero < twice, looked.color[c], slab.color[c]);
