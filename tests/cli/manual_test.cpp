@@ -49,6 +49,25 @@ TEST_F(Manual, EveryVerbHasAManPageWithEveryFlag) {
     }
 }
 
+TEST_F(Manual, AFlagSaysWhatItTakesAndWhatMayBeLeftOut) {
+    const std::string compare = squint("help compare --form man").out;
+    EXPECT_THAT(compare, HasSubstr("\\fBsquint compare\\fR [\\fIFLAGS\\fR] \\fIA\\fR \\fIB\\fR\n"));
+    EXPECT_THAT(compare, HasSubstr("\\fB\\-\\-json\\fR [\\fIFILE|\\-\\fR]\n")) << "its value may be left out";
+    EXPECT_THAT(compare, HasSubstr("\\fB\\-\\-max\\-error\\fR, \\fB\\-\\-fail\\-above\\fR \\fILSB8\\fR\n"));
+    const std::string plan = squint("help plan --form man").out;
+    EXPECT_THAT(plan, HasSubstr("\\fB\\-\\-brief\\fR\n")) << "takes no value";
+    const std::string zsh = squint("help --form zsh").out;
+    EXPECT_THAT(zsh, HasSubstr(":NAME:(auto model lanes)'"));
+    EXPECT_THAT(zsh, HasSubstr("::FILE|-:_files'"));
+}
+
+TEST_F(Manual, TheScenesPageHasEveryKeyAndItsWords) {
+    const std::string page = squint("help --form scene").out;
+    for (const char* part : {".TH SQUINT\\-SCENE 5", "\\fBsampling.step\\fR",
+                             "\\fBprecision.transparency\\fR", "phong, blinn_phong, cone, gooch"})
+        EXPECT_THAT(page, HasSubstr(part));
+}
+
 TEST_F(Manual, PagesAreGoodRoff) {
     if (!there_is("groff")) GTEST_SKIP() << "groff is not installed";
     for (const char* page : {"--form man", "--form man render", "--form man number", "--form scene"}) {

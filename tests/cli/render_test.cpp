@@ -8,6 +8,7 @@
 
 #include <chrono>
 #include <csignal>
+#include <sstream>
 #include <thread>
 
 namespace squint {
@@ -177,6 +178,67 @@ TEST_F(Render, AuditPrintsATableOfWires) {
     EXPECT_THAT(r.out, HasSubstr("saturated"));
     EXPECT_THAT(r.out, HasSubstr("transparency"));
     EXPECT_EQ(r.err, "");
+}
+
+TEST_F(Render, TheAuditsTableSaysWhatItsRecordSays) {
+    const std::string scene = kSmall + "--set precision.color='u1.8 wrap' --audit -q ";
+    std::istringstream table(squint("render" + scene).out);
+    const auto record = squint("render" + scene + "--json -").json()["pictures"][0]["audit"];
+    std::string line;
+    std::getline(table, line);
+    std::size_t wires = 0;
+    while (std::getline(table, line) && !line.starts_with("bits:")) {
+        std::istringstream cells(line);
+        std::string wire, format, bits;
+        std::int64_t count = 0;
+        double least = 0, greatest = 0;
+        cells >> wire >> format >> count >> least >> greatest;
+        for (std::string word; cells >> word;) bits = word;
+        ASSERT_TRUE(record.contains(wire)) << wire;
+        const auto& of = record[wire];
+        EXPECT_EQ(of["format"], format);
+        EXPECT_EQ(of["count"], count) << wire;
+        EXPECT_NEAR(of["min"].get<double>(), least, 1e-5 * std::abs(least)) << wire;
+        EXPECT_NEAR(of["max"].get<double>(), greatest, 1e-5 * std::abs(greatest)) << wire;
+        // A digit for each number of bits that some value needs: the power of ten of how many do.
+        const std::vector<std::int64_t> magnitude = of["magnitude_bits"];
+        ASSERT_GE(bits.size(), magnitude.size()) << wire;
+        for (std::size_t b = 0; b < bits.size(); ++b) {
+            const std::int64_t values = b < magnitude.size() ? magnitude[b] : 0;
+            EXPECT_EQ(bits[b], values == 0 ? '.' : std::to_string(std::to_string(values).size() - 1)[0])
+                << wire << ' ' << b;
+        }
+        ++wires;
+    }
+    EXPECT_EQ(wires, record.size());
+    EXPECT_GT(wires, 20u);
+}
+
+TEST_F(Render, WhatIsAskedForDecidesWhatIsWritten) {
+    const auto written = [&](const std::string& flags) {
+        for (const std::string& name : files()) fs::remove(folder / name);
+        const Outcome r = squint("render" + kSmall + "-q " + flags);
+        EXPECT_EQ(r.code, 0) << flags << r.err;
+        return files();
+    };
+    EXPECT_THAT(written(""), ElementsAre("squint.exr"));
+    EXPECT_THAT(written("--preview p.jpg"), ElementsAre("p.jpg"));
+    EXPECT_THAT(written("-o p.png"), ElementsAre("p.png"));
+    EXPECT_THAT(written("--json r.json"), ElementsAre("r.json"));
+    EXPECT_THAT(written("--audit"), ElementsAre());
+    EXPECT_THAT(written("--reference-output x.exr"), ElementsAre("squint.exr", "x.exr"));
+    expect_refusal(squint("render -o a.png --preview b.png"), "a second preview beside --preview b.png");
+}
+
+TEST_F(Render, SaysThePriceOfErrorsAndHowToMakeAFilm) {
+    const Outcome lit = squint("render" + kSmall + "--error -o a.exr");
+    EXPECT_THAT(lit.err, HasSubstr("measuring the error: 7 more pictures")) << "in double, and six stages";
+    const Outcome real = squint("render" + kSmall + "--set precision.preset=real --error -o a.exr");
+    EXPECT_THAT(real.err, HasSubstr("measuring the error: 1 more pictures"));
+    const Outcome turn = squint("render" + kSmall + "--set camera.turntable=2 -o t.exr");
+    EXPECT_THAT(turn.err, HasSubstr("film: ffmpeg -framerate 25 -apply_trc iec61966_2_1 -i 't.%04d.exr'"));
+    const Outcome shown = squint("render" + kSmall + "--set camera.turntable=2 --preview t.png");
+    EXPECT_THAT(shown.err, HasSubstr("film: ffmpeg -framerate 25 -i 't.%04d.png'"));
 }
 
 TEST_F(Render, AuditDoesNotChangeThePicture) {
