@@ -2,11 +2,20 @@
 
 #include <algorithm>
 #include <functional>
+#include <stdexcept>
 
 namespace squint {
 
 thread_local Bill* Tally::bill = nullptr;
 thread_local std::array<int, 64> Tally::wires{};
+thread_local const char* Tally::ways = nullptr;
+thread_local Tally::Columns* Tally::columns = nullptr;
+
+bool any(Followed) {
+    if (!Tally::ways) return true;
+    if (*Tally::ways == 0) throw std::logic_error("a tally takes another way than the slab it follows");
+    return *Tally::ways++ == '1';
+}
 
 // ------------------------------------------------------------------------------------------- bills
 
@@ -68,6 +77,12 @@ void note_lookup(int width) {
     if (!Tally::bill) return;
     ++Tally::bill->lookups, Tally::bill->lookup_bits += width;
 }
+Range column_range(const Table& table, const Range& row, int column) {
+    if (!Tally::columns) return gather(table, row, column);
+    const auto [at, is_new] = Tally::columns->try_emplace({&table, column});
+    if (is_new) at->second = gather(table, row, column);
+    return at->second;
+}
 // A word of a table is as wide as its wire's format.
 Tally looked_up(const Range& proven, int wire) {
     const Tally word = with_width(proven, wire >= 0 ? Tally::wires[static_cast<std::size_t>(wire)] : 0);
@@ -113,12 +128,12 @@ Tally max(const Tally& a, const Tally& b) {
 Tally absolute(const Tally& x) {
     return {absolute(x.proven), x.spare, x.is_constant};
 }
-Tally select(Perhaps, const Tally& yes, const Tally& no) {
+Tally select(Followed, const Tally& yes, const Tally& no) {
     // As wide as the wider one: the spare bits of each belong to its own range.
     return with_width(select(Perhaps{}, yes.proven, no.proven), std::max(yes.width(), no.width()));
 }
 Tally gather(const Table& table, const Tally& row, int column) {
-    return looked_up(gather(table, row.proven, column), table.wire_of(column));
+    return looked_up(column_range(table, row.proven, column), table.wire_of(column));
 }
 std::array<Tally, 4> gather_cell(const CellTable& table, const Tally& row, const Tally& column) {
     const std::array<Range, 4> cell = gather_cell(table, row.proven, column.proven);

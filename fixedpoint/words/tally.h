@@ -1,6 +1,6 @@
 // A word that counts the operations of a stage as hardware: multipliers, dividers, roundings and look-ups, by
-// the widths of their operands.  Both outcomes of a comparison are followed (Perhaps), so that a run counts
-// the dearest path.
+// the widths of their operands.  Both outcomes of a comparison are followed (Followed), so that a run counts
+// the dearest path; or a run follows the ways of a slab that was computed (branching.h), and counts those.
 //
 // Widths: a value on a wire has the width of its format.  A sum or a difference has the width of its proven
 // range, plus the bits by which the formats of its wires exceed what was proven of them.  A value narrowed by
@@ -45,7 +45,20 @@ struct Tally {
 
     static thread_local Bill* bill;                 // where operations are counted; null: nowhere
     static thread_local std::array<int, 64> wires;  // width of every wire's format: what tables hold
+    // What any() answers, one after the other, as Branching::ways has it; null: always yes.
+    static thread_local const char* ways;
+    // What columns of tables hold, for runs that read the same tables again; null: not kept.
+    using Columns = std::map<std::pair<const Table*, int>, Range>;
+    static thread_local Columns* columns;
 };
+/// A comparison of tallies.
+struct Followed {
+    friend constexpr Followed operator&(Followed, Followed) { return {}; }
+    friend constexpr Followed operator|(Followed, Followed) { return {}; }
+    friend constexpr Followed operator!(Followed) { return {}; }
+};
+/// Throws std::logic_error where Tally::ways are at their end.
+bool any(Followed);
 /// A value of `width` bits, proven to lie in `proven`.
 Tally tally_of(const Range& proven, int width);
 
@@ -55,10 +68,10 @@ constexpr Tally make_word(WordTag<Tally>, std::int64_t value) {
 Tally operator+(const Tally& a, const Tally& b);
 Tally operator-(const Tally& a, const Tally& b);
 Tally operator*(const Tally& a, const Tally& b);
-constexpr Perhaps operator==(const Tally&, const Tally&) {
+constexpr Followed operator==(const Tally&, const Tally&) {
     return {};
 }
-constexpr Perhaps operator<(const Tally&, const Tally&) {
+constexpr Followed operator<(const Tally&, const Tally&) {
     return {};
 }
 Tally shift_left(const Tally& x, int bits);
@@ -66,7 +79,7 @@ Tally floor_shift(const Tally& x, int bits);
 Tally min(const Tally& a, const Tally& b);
 Tally max(const Tally& a, const Tally& b);
 Tally absolute(const Tally& x);
-Tally select(Perhaps, const Tally& yes, const Tally& no);
+Tally select(Followed, const Tally& yes, const Tally& no);
 Tally gather(const Table& table, const Tally& row, int column);
 std::array<Tally, 4> gather_cell(const CellTable& table, const Tally& row, const Tally& column);
 Tally blend(const Tally& v0, const Tally& v1, const Tally& weight, int weight_bits);

@@ -59,7 +59,7 @@ SweepFile sweep_of(const Settings& s) {
                                                          : "bytes of tables",
                               s.figure == Figure::largest ? "greatest" : "rms", s.most_error,
                               s.srgb ? " on an sRGB display" : "");
-    sweep.measure.ssim = false;
+    sweep.measure.ssim = false, sweep.measure.mean_cost = false;
     sweep.measure.srgb = s.srgb;
     sweep.measure.picture_size = kPictureSize;
     if (s.cost == CostKind::time) sweep.measure.repeats = s.repeats, sweep.measure.threads = s.threads;

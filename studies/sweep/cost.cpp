@@ -1,11 +1,13 @@
 #include "studies/sweep/cost.h"
 
 #include "pipeline/plan/any_slab-inl.h"
+#include "studies/sweep/ways.h"
 
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <array>
+#include <stdexcept>
 
 namespace squint::sweep {
 namespace {
@@ -30,7 +32,7 @@ class BillOfParts : public Silent {
             Tally::wires[static_cast<std::size_t>(w)] = width(plan, static_cast<Wire>(w));
     }
     BillOfParts(const BillOfParts&) = delete;
-    ~BillOfParts() { Tally::bill = nullptr; }
+    ~BillOfParts() { Tally::bill = nullptr, Tally::ways = nullptr; }
     void slab(const Tally&) { bills = {}; }
     void at(Part part) { Tally::bill = &bills[static_cast<std::size_t>(part)]; }
 };
@@ -50,30 +52,74 @@ struct SumTables {
     }
 };
 
-}  // namespace
+void add_times(Bill& sum, const Bill& bill, std::int64_t times) {
+    const auto add = [&](auto& to, const auto& from) {
+        for (const auto& [widths, count] : from) to[widths] += times * count;
+    };
+    add(sum.multipliers, bill.multipliers), add(sum.constant_multipliers, bill.constant_multipliers);
+    add(sum.dividers, bill.dividers), add(sum.roundings, bill.roundings);
+    sum.lookups += times * bill.lookups, sum.lookup_bits += times * bill.lookup_bits;
+}
 
-Cost cost_of(const Plan& plan) {
-    Cost cost;
+// Runs of one plan read the same columns of its tables.
+struct KeptColumns {
+    Tally::Columns columns;
+    KeptColumns() { Tally::columns = &columns; }
+    KeptColumns(const KeptColumns&) = delete;
+    ~KeptColumns() { Tally::columns = nullptr; }
+};
+
+// Of one slab, on its dearest path, or on the way that slabs of a picture take.
+std::array<Bill, kParts> bills_of(const Plan& plan, const SlabWay* way = nullptr) {
     BillOfParts counted(plan);
-    any_slab<Tally>(plan, counted,
-                    2);  // the second of two neighbours: they share the sample between them
+    std::string ways;
+    if (way) ways = way->before + way->ways, Tally::ways = ways.c_str();
+    // The second of two neighbours, unless it has none: they share the sample between them.
+    any_slab<Tally>(plan, counted, way && way->is_first ? 1 : 2);
+    if (way && *Tally::ways != 0)
+        throw std::logic_error("a tally leaves the way of the slab that it follows");
+    return counted.bills;
+}
+
+std::array<Bill, kParts> bills_of_picture(const Plan& plan, const PictureWays& picture) {
+    std::array<Bill, kParts> sum;
+    const KeptColumns kept;
+    for (const SlabWay& way : picture.ways) {
+        const std::array<Bill, kParts> one = bills_of(plan, &way);
+        for (std::size_t part = 0; part < kParts; ++part) {
+            // A projected ray samples the ends of all its slabs, and is classified once.
+            const bool samples = plan.projection_mode && part <= static_cast<std::size_t>(Part::input);
+            add_times(sum[part], one[part], samples ? 0 : way.slabs);
+            if (samples && &way == &picture.ways.front())
+                add_times(sum[part], one[part], picture.slabs + picture.rays);
+        }
+    }
+    return sum;
+}
+
+Cost cost_with(const Plan& plan, const PictureWays* picture) {
+    Cost cost;
+    const std::array<Bill, kParts> bills = bills_of(plan);
+    std::array<Bill, kParts> taken;
+    if (picture) taken = bills_of_picture(plan, *picture), cost.taken = {picture->rays, picture->slabs, {}};
     for (std::size_t s = 0; s < plan.stages.size(); ++s) {
         if (!plan.stages[s].modelled) continue;
-        StageCost stage{plan.stages[s].name, {}, 0, {}, {}, plan.stages[s].needs};
+        StageCost stage{plan.stages[s].name, {}, 0, {}, {}, {}, plan.stages[s].needs};
         for (const Wire wire : plan.used_wires)
             if (info(wire).stage == stage.stage)
                 stage.wires.push_back(wire), stage.word_bits += width(plan, wire);
         for (std::size_t part = 0; part < kParts; ++part) {
             if (stage_index(static_cast<Part>(part)) != s) continue;
-            stage.parts.emplace_back(kPartNames[part], counted.bills[part]);
-            stage.bill.merge(counted.bills[part]);
+            stage.parts.push_back(
+                {static_cast<Part>(part), std::string(kPartNames[part]), bills[part], taken[part]});
+            stage.bill.merge(bills[part]), stage.taken.merge(taken[part]);
         }
         if (stage.stage == "classification")
             cost.entry_bytes = static_cast<double>(stage.bill.lookup_bits) / 8;
         cost.word_bits += stage.word_bits, cost.bill.merge(stage.bill);
+        if (cost.taken) cost.taken->bill.merge(stage.taken);
         cost.stages.push_back(std::move(stage));
     }
-    Tally::bill = nullptr;
     Plan visited = plan;
     std::visit([&](auto& method) { method.visit(SumTables{cost}); }, visited.method);
     if (plan.lit) SumTables{cost}(plan.shading.power_table);
@@ -90,14 +136,36 @@ Cost cost_of(const Plan& plan) {
     return cost;
 }
 
+}  // namespace
+
+Cost cost_of(const Plan& plan) {
+    return cost_with(plan, nullptr);
+}
+Cost cost_of_picture(const Plan& plan, int most_rays) {
+    const PictureWays picture = ways_of(plan, most_rays);
+    return cost_with(plan, &picture);
+}
+
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-void add_operations(Json& list, const std::string& part,
-                    const std::map<Bill::Widths, std::int64_t>& operations) {
-    for (const auto& [widths, count] : operations)
-        list.push_back({{"what", part}, {"count", count}, {"widths", {widths.first, widths.second}}});
+// A mean of the slabs of a picture.
+double mean(const Cost::Taken& of, std::int64_t sum) {
+    return of.slabs > 0 ? static_cast<double>(sum) / static_cast<double>(of.slabs) : 0;
+}
+
+// One kind of operation of a part: its number on the dearest path and in the mean, by widths.
+void add_operations(Json& list, const PartCost& part, std::map<Bill::Widths, std::int64_t> Bill::*kind,
+                    const Cost& cost) {
+    std::map<Bill::Widths, std::pair<std::int64_t, std::int64_t>> both;
+    for (const auto& [widths, count] : part.bill.*kind) both[widths].first = count;
+    for (const auto& [widths, count] : part.taken.*kind) both[widths].second = count;
+    for (const auto& [widths, counts] : both) {
+        list.push_back(
+            {{"what", part.what}, {"count", counts.first}, {"widths", {widths.first, widths.second}}});
+        if (cost.taken) list.back()["mean"] = mean(*cost.taken, counts.second);
+    }
 }
 void add_bits(Json& json, const Bill& bill) {
     json["multiplier_bits"] = bill.multiplier_bits();
@@ -107,6 +175,13 @@ void add_bits(Json& json, const Bill& bill) {
     json["lookups"] = bill.lookups;
     json["lookup_bits"] = bill.lookup_bits;
 }
+void add_means(Json& json, const Bill& taken, const Cost& cost) {
+    if (!cost.taken) return;
+    Json sums;
+    add_bits(sums, taken);
+    for (const auto& [name, sum] : sums.items())
+        json["mean_" + name] = mean(*cost.taken, sum.get<std::int64_t>());
+}
 
 }  // namespace
 
@@ -114,13 +189,14 @@ nlohmann::ordered_json json_of(const Cost& cost) {
     Json stages = Json::object();
     for (const StageCost& stage : cost.stages) {
         Json multipliers = Json::array(), dividers = Json::array(), constant = Json::array();
-        for (const auto& [part, bill] : stage.parts) {
-            add_operations(multipliers, part, bill.multipliers);
-            add_operations(dividers, part, bill.dividers);
-            add_operations(constant, part, bill.constant_multipliers);
+        for (const PartCost& part : stage.parts) {
+            add_operations(multipliers, part, &Bill::multipliers, cost);
+            add_operations(dividers, part, &Bill::dividers, cost);
+            add_operations(constant, part, &Bill::constant_multipliers, cost);
         }
         Json& json = stages[stage.stage] = {{"word_bits", stage.word_bits}};
         add_bits(json, stage.bill);
+        add_means(json, stage.taken, cost);
         json["operand_bits"] = stage.needs.operand_bits;
         json["result_bits"] = stage.needs.result_bits;
         json["multipliers"] = multipliers;
@@ -129,6 +205,12 @@ nlohmann::ordered_json json_of(const Cost& cost) {
     }
     Json json{{"bits", cost.bits()}, {"word_bits", cost.word_bits}};
     add_bits(json, cost.bill);
+    if (cost.taken) {
+        json["mean_bits"] =
+            static_cast<double>(cost.word_bits) + mean(*cost.taken, operation_bits(cost.taken->bill));
+        add_means(json, cost.taken->bill, cost);
+        json["mean_of"] = {{"rays", cost.taken->rays}, {"slabs", cost.taken->slabs}};
+    }
     json["table_bits"] = cost.table_bits;
     json["table_bytes"] = cost.table_bytes;
     json["pixel_bits"] = cost.pixel_bits;

@@ -5,10 +5,12 @@
 
 #include "fixedpoint/words/tally.h"
 #include "pipeline/plan/plan.h"
+#include "pipeline/slab.h"
 
 #include <nlohmann/json_fwd.hpp>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,19 +22,32 @@ inline std::int64_t operation_bits(const Bill& bill) {
     return bill.multiplier_bits() + bill.divider_bits() + bill.rounding_bits();
 }
 
+/// A part of a stage.
+struct PartCost {
+    Part part{};
+    std::string what;
+    Bill bill;   // of one slab on its dearest path
+    Bill taken;  // of all slabs of Cost::taken together, on the paths that they take
+};
 struct StageCost {
     std::string stage;
     std::vector<Wire> wires;  // those that the scene uses
     std::int64_t word_bits = 0;
-    std::vector<std::pair<std::string, Bill>> parts;  // of the stage: what one slab takes on its dearest path
-    Bill bill;                                        // of all parts
-    WordNeeds needs;                                  // of the model's exact results
+    std::vector<PartCost> parts;
+    Bill bill, taken;  // of all parts
+    WordNeeds needs;   // of the model's exact results
 };
 
 struct Cost {
     std::vector<StageCost> stages;  // those that are modelled
     std::int64_t word_bits = 0;
-    Bill bill;                      // of one slab on its dearest path
+    Bill bill;  // of one slab on its dearest path
+    // The slabs of some rays of the picture, and what they take together.
+    struct Taken {
+        std::int64_t rays = 0, slabs = 0;
+        Bill bill;
+    };
+    std::optional<Taken> taken;
     std::int64_t table_bits = 0;    // at the width of each wire
     std::int64_t table_bytes = 0;   // as this program stores them
     std::int64_t pixel_bits = 0;    // of the compositing buffer, for C and T
@@ -45,6 +60,10 @@ struct Cost {
 };
 
 Cost cost_of(const Plan& plan);
+/// The same, with what the slabs of a picture take: those of at most `most_rays` x `most_rays` rays, evenly spaced.
+/// The sample between two slabs counts to the one that is computed first; a ray's first slab has both its ends.
+/// The plan rounds: !plan.real.
+Cost cost_of_picture(const Plan& plan, int most_rays);
 
 nlohmann::ordered_json json_of(const Cost& cost);
 

@@ -25,6 +25,7 @@
 namespace squint::sweep {
 namespace {
 
+constexpr int kMeanCostRays = 16;                                   // a side: some 40,000 slabs
 constexpr std::size_t kMostRememberedBytes = std::size_t{1} << 28;  // of baseline pictures kept in memory
 
 bool is_skipped(std::string_view key, const std::vector<std::string_view>& prefixes) {
@@ -433,6 +434,7 @@ std::vector<std::string> Evaluator::wanted(bool base) const {
     }
     if (m.srgb) names.push_back("srgb");
     if (m.ssim) names.push_back("ssim");
+    if (m.mean_cost) names.push_back("mean cost");
     if (m.audit.value_or(base)) names.push_back("audit");
     if (m.conservation) names.push_back("conservation");
     if (m.repeats > 0) names.push_back(fmt::format("time of {} by {} threads", m.repeats, m.threads));
@@ -486,7 +488,7 @@ Json Evaluator::measure(const Prepared& point, int threads, bool timed, bool bas
         json["audit"] = json_of_audit(plan, again.statistics);
         if (!plan.real) json["stuck"] = stuck_transparency(plan);
     }
-    json["cost"] = json_of(cost_of(plan));
+    json["cost"] = json_of(m.mean_cost && !plan.real ? cost_of_picture(plan, kMeanCostRays) : cost_of(plan));
     Json& wires = json["wires"] = Json::object();
     for (const Wire wire : plan.used_wires)
         wires[std::string(info(wire).name)] = plan.real ? plan.real_name() : to_string(plan.specs[wire]);

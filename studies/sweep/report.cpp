@@ -69,6 +69,13 @@ constexpr std::array kCostNames{"bits",
                                 "constant_multiplier_bits",
                                 "lookups",
                                 "lookup_bits",
+                                "mean_bits",
+                                "mean_multiplier_bits",
+                                "mean_divider_bits",
+                                "mean_rounding_bits",
+                                "mean_constant_multiplier_bits",
+                                "mean_lookups",
+                                "mean_lookup_bits",
                                 "table_bits",
                                 "table_bytes",
                                 "pixel_bits",
@@ -90,7 +97,7 @@ Json point_of(const Json& record) {
     p["volume"] = record["volume"]["name"];
     const Json& cost = record["cost"];
     for (const char* name : kCostNames)
-        if (cost.contains(name)) p["cost"][name] = cost[name];  // squint.point/1 has fewer
+        if (cost.contains(name)) p["cost"][name] = cost[name];  // old records have fewer
     for (const auto& [stage, figures] : cost["stages"].items())
         p["stages"][stage] = {figures["word_bits"], figures["multiplier_bits"]};
     p["wires"] = record["wires"];

@@ -364,12 +364,13 @@ class Reader {
     }
 
     void measure(const TomlValue& v) {
-        only(v, {"real", "reference", "srgb", "ssim", "audit", "conservation", "repeats", "threads", "exr",
-                 "picture_size"});
+        only(v, {"real", "reference", "srgb", "ssim", "mean_cost", "audit", "conservation", "repeats",
+                 "threads", "exr", "picture_size"});
         Measure& m = sweep_.measure;
         const std::pair<const char*, bool*> flags[] = {
-            {"real", &m.real}, {"reference", &m.reference},       {"srgb", &m.srgb},
-            {"ssim", &m.ssim}, {"conservation", &m.conservation}, {"exr", &m.exr}};
+            {"real", &m.real}, {"reference", &m.reference}, {"srgb", &m.srgb},
+            {"ssim", &m.ssim}, {"mean_cost", &m.mean_cost}, {"conservation", &m.conservation},
+            {"exr", &m.exr}};
         for (const auto& [name, target] : flags)
             if (const auto* found = v.find(name)) *target = flag(*found);
         if (const auto* found = v.find("audit")) m.audit = flag(*found);

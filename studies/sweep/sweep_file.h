@@ -55,6 +55,7 @@ struct Measure {
     bool reference = false;  // against the exact integral: all errors
     bool srgb = false;       // also colour differences as a display shows them
     bool ssim = true;
+    bool mean_cost = true;  // what the samples of the picture cost, beside the dearest
     // Ranges, saturation, wrap and stuck T: one more render, audited.  Absent: of base points alone.
     std::optional<bool> audit;
     bool conservation = false;  // |C + T - 1| with white colours and no light: one more render

@@ -4,9 +4,11 @@
 #include "core/volume_source.h"
 #include "pipeline/plan/any_slab-inl.h"
 #include "pipeline/render.h"
+#include "pipeline/stages/ray_setup-inl.h"
 #include "scene/scene.h"
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -106,7 +108,7 @@ Counting<B> absolute(Counting<B> x) {
 }
 template <bool B, class C>
 Counting<B> select(C condition, Counting<B> yes, Counting<B> no) {
-    if constexpr (std::is_same_v<C, bool>)
+    if constexpr (std::is_convertible_v<C, bool>)  // of bools & is an int
         return varying<B>(condition ? yes.v : no.v);
     else
         return varying<B>(0);
@@ -162,6 +164,9 @@ Counting<B> quotient(Counting<B> numerator, Counting<B> denominator, const Resca
 }
 using EveryPath = Counting<true>;
 using OnePath = Counting<false>;
+std::int64_t to_index(OnePath x) {
+    return static_cast<std::int64_t>(x.v);
+}
 EveryPath any_word(WordTag<EveryPath>, const Range&, int) {
     return {};
 }
@@ -169,11 +174,10 @@ Range range_of(const EveryPath&) {
     return {};
 }
 
-// What a run of any slab counts, its last slab alone.
-struct LastSlab : Silent {
+// What a run counts, part by part.
+struct AllSlabs : Silent {
     std::array<Counts, kParts> counts{};
     int part = -1;
-    void slab(const EveryPath&) { close(), counts = {}; }
     void at(Part p) { close(), part = static_cast<int>(p); }
     void close() {
         if (part >= 0) {
@@ -184,6 +188,10 @@ struct LastSlab : Silent {
         counted = {};
     }
 };
+// What a run of any slab counts, its last slab alone.
+struct LastSlab : AllSlabs {
+    void slab(const EveryPath&) { close(), counts = {}; }
+};
 
 Counts counts_of(const Bill& bill) {
     std::int64_t roundings = 0;
@@ -191,6 +199,35 @@ Counts counts_of(const Bill& bill) {
     return {Bill::number(bill.multipliers), Bill::number(bill.constant_multipliers),
             Bill::number(bill.dividers), roundings, bill.lookups};
 }
+
+// A volume whose voxels vary.
+struct VaryingVoxels {
+    HWY_NAMESPACE::FromVolume voxels;
+    template <class W>
+    Cell<W> cell(const std::array<W, 3>& at) const {
+        auto cell = voxels.cell(at);
+        for (W& corner : cell.corner) corner.is_constant = false;
+        return cell;
+    }
+    template <class W>
+    HWY_NAMESPACE::Neighbourhood<W> neighbourhood(const std::array<W, 3>& at) const {
+        auto near = voxels.neighbourhood(at);
+        for (W& voxel : near.voxel) voxel.is_constant = false;
+        return near;
+    }
+    template <class W>
+    HWY_NAMESPACE::Neighbourhood<W> box_sums(const std::array<W, 3>& at) const {
+        auto near = voxels.box_sums(at);
+        for (W& sum : near.voxel) sum.is_constant = false;
+        return near;
+    }
+    template <class W>
+    W nears_wall(const WallStage& walls, const std::array<W, 3>& at) const {
+        W near = voxels.nears_wall(walls, at);
+        near.is_constant = false;
+        return near;
+    }
+};
 
 Plan plan_with(std::vector<std::string> settings) {
     settings.insert(settings.begin(), {"volume.dims=[16, 16, 16]", "classification.method=pc"});
@@ -225,6 +262,16 @@ const std::vector<std::vector<std::string>> kVariants{
     {"compositing.mode=mip"},
     {"compositing.mode=average"}};
 
+// Where slabs take different ways: lit or not, opaque, cut in pieces, in a projection or backwards.
+const std::vector<std::vector<std::string>> kTakenVariants{
+    {},
+    {"shading.model=none"},
+    {"shading.inside=adaptive", "sampling.step=2"},
+    {"shading.gradient=central_samples", "compositing.form=back_to_front"},
+    {"sampling.interpolation=nearest", "precision.preset=wide"},
+    {"compositing.mode=mip"},
+    {"compositing.mode=average"}};
+
 std::string text_of(const std::vector<std::string>& a, const std::vector<std::string>& b) {
     std::string text;
     for (const auto* list : {&a, &b})
@@ -251,12 +298,122 @@ TEST(Cost, CountsWhatAnIndependentWordCountsForEveryMethodAndModel) {
                 for (std::size_t part = 0; part < kParts; ++part) {
                     if (kStages[stage_index(static_cast<Part>(part))] != stage.stage) continue;
                     ASSERT_LT(i, stage.parts.size());
-                    EXPECT_EQ(counts_of(stage.parts[i].second), every.counts[part])
-                        << stage.parts[i].first << ": " << text_of(method, variant);
+                    EXPECT_EQ(counts_of(stage.parts[i].bill), every.counts[part])
+                        << stage.parts[i].what << ": " << text_of(method, variant);
                     ++i;
                 }
             }
         }
+}
+
+// A ray's words, each of which varies from ray to ray.
+RayWords<OnePath> words_of(const Plan& plan, const RaySetup& ray) {
+    auto words = HWY_NAMESPACE::ray_words<OnePath>(plan, ray);
+    for (auto* vector : {&words.first, &words.last, &words.step, &words.view})
+        for (OnePath& word : *vector) word.is_constant = false;
+    for (auto& half : words.half)
+        for (OnePath& word : half) word.is_constant = false;
+    words.last_index.is_constant = words.last_length.is_constant = false;
+    return words;
+}
+// What all rays of a picture take, counted by the word itself on the path that each takes.  As cast_ray(), whose
+// slabs' numbers and first pixel are constants to a word that sees one ray.
+AllSlabs counts_of_picture(const Plan& plan, std::int64_t& slabs_taken) {
+    AllSlabs all;
+    const auto cast = [&](const auto& method, const RaySetup& ray) -> std::int64_t {
+        const auto words = words_of(plan, ray);
+        const VaryingVoxels voxels{{*plan.volume}};
+        const auto at = [](std::int64_t k) { return varying<false>(k); };
+        counted = {};  // setting up a ray is none of its slabs
+        HWY_NAMESPACE::Slabs slabs(plan, method, voxels, words, at(ray.slabs), all);
+        for (OnePath& color : slabs.pixel.color) color.is_constant = false;
+        slabs.pixel.transparency.is_constant = false;
+        if (plan.projection_mode) {
+            const CompositingMode mode = plan.scene.compositing.mode;
+            OnePath kept = slabs.sample(at(0)).input;
+            for (std::int64_t k = 1; k <= ray.slabs; ++k)
+                kept = HWY_NAMESPACE::merge_samples(mode, kept, slabs.sample(at(k)).input);
+            if (mode == CompositingMode::average) kept = at(0);
+            slabs.project({kept, at(0), at(ray.slabs), words.last_length});
+            return ray.slabs;
+        }
+        const bool backwards = plan.compositing.form == CompositingForm::back_to_front;
+        std::int64_t taken = 0;
+        for (std::int64_t i = 0; i < ray.slabs; ++i, ++taken) {
+            if (!backwards && i > 0 && !slabs.goes_on()) break;
+            slabs.step(at(backwards ? ray.slabs - 1 - i : i));
+        }
+        return taken;
+    };
+    for (int row = 0; row < plan.camera.height; ++row)
+        for (int column = 0; column < plan.camera.width; ++column) {
+            const RaySetup ray = plan.set_up(column, row);
+            if (ray.slabs == 0) continue;
+            slabs_taken += std::visit([&](const auto& method) { return cast(method, ray); }, plan.method);
+            all.close();
+        }
+    return all;
+}
+
+TEST(Cost, TheMeanIsWhatAnIndependentWordCountsOnThePathsThatAPictureTakes) {
+    for (const auto& method : kMethods)
+        for (const auto& variant : kTakenVariants) {
+            std::vector<std::string> settings = method;
+            settings.insert(settings.end(), variant.begin(), variant.end());
+            settings.insert(settings.end(), {"image.width=8", "image.height=6", "camera.height=16"});
+            const std::string text = text_of(method, variant);
+            const bool has_parts =
+                text.find("pips") != std::string::npos || text.find("leg") != std::string::npos;
+            if (text.find("interpolation=nearest") != std::string::npos && method != kMethods.front())
+                continue;
+            if (text.find("adaptive") != std::string::npos && !has_parts) continue;
+            const Plan plan = plan_with(settings);
+            std::int64_t slabs = 0;
+            const AllSlabs all = counts_of_picture(plan, slabs);
+            ASSERT_GT(slabs, 20);
+            const sweep::Cost cost = sweep::cost_of_picture(plan, 8);
+            ASSERT_TRUE(cost.taken);
+            EXPECT_EQ(cost.taken->slabs, slabs);
+            for (const sweep::StageCost& stage : cost.stages)
+                for (const sweep::PartCost& part : stage.parts)
+                    EXPECT_EQ(counts_of(part.taken), all.counts[static_cast<std::size_t>(part.part)])
+                        << part.what << ": " << text_of(method, variant);
+        }
+}
+
+// A thin fog, lit, in one slab a ray that is shorter than a step: every slab takes the dearest path.
+TEST(Cost, WhereEverySampleTakesTheDearestPathTheMeanIsTheDearest) {
+    const Plan plan = plan_with({"transfer_function.points=[[0, 1, 1, 1, 0.01], [4095, 1, 1, 1, 0.01]]",
+                                 "transfer_function.unit_distance=1", "sampling.step=64", "image.width=12",
+                                 "image.height=12", "camera.height=8"});
+    ASSERT_TRUE(plan.lit);
+    const sweep::Cost cost = sweep::cost_of_picture(plan, 12);
+    ASSERT_TRUE(cost.taken);
+    EXPECT_EQ(cost.taken->rays, 144);
+    EXPECT_EQ(cost.taken->slabs, 144);
+    for (const sweep::StageCost& stage : cost.stages) {
+        EXPECT_GT(sweep::operation_bits(stage.bill), 0) << stage.stage;
+        EXPECT_EQ(sweep::operation_bits(stage.taken), 144 * sweep::operation_bits(stage.bill)) << stage.stage;
+        EXPECT_EQ(stage.taken.lookups, 144 * stage.bill.lookups) << stage.stage;
+    }
+    const nlohmann::ordered_json json = sweep::json_of(cost);
+    EXPECT_EQ(json["mean_bits"].get<double>(), json["bits"].get<double>());
+}
+
+TEST(Cost, ATransparentPictureIsNeitherLitNorShaded) {
+    const Plan plan =
+        plan_with({"transfer_function.points=[[0, 1, 1, 1, 0], [4080, 1, 1, 1, 0], [4095, 1, 1, 1, 0.5]]",
+                   "transfer_function.unit_distance=1", "volume.procedural=sphere", "volume.dims=16",
+                   "image.width=8", "image.height=8", "camera.height=16"});
+    ASSERT_TRUE(plan.lit);
+    const sweep::Cost cost = sweep::cost_of_picture(plan, 8);
+    ASSERT_TRUE(cost.taken);
+    ASSERT_GT(cost.taken->slabs, 100);
+    for (const sweep::StageCost& stage : cost.stages) {
+        const bool is_lighting = stage.stage == "gradient" || stage.stage == "shading";
+        EXPECT_GT(sweep::operation_bits(stage.bill), 0) << stage.stage;
+        EXPECT_EQ(counts_of(stage.taken) == Counts{}, is_lighting) << stage.stage;
+    }
 }
 
 // One slab of the built-in scene, a full step long, on the path that it takes: what a reviewer counted by a

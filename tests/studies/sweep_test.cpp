@@ -224,6 +224,27 @@ TEST(SweepPoint, CountsSamplesAtWhichTransparencyStuck) {
     EXPECT_EQ(record["audit"]["color"]["underflowed"], 0);
 }
 
+TEST(SweepPoint, MeasuresTheMeanCostUnlessItIsToldNotTo) {
+    for (const bool wanted : {true, false}) {
+        const SweepFile sweep = parsed(kTiny + (wanted ? "" : "[measure]\nmean_cost = false\n"));
+        Evaluator evaluator(sweep, "");
+        const Prepared p = evaluator.prepare(expand(sweep, {})[0]);
+        EXPECT_EQ(p.failure, "");
+        const Json cost = evaluator.measure(p, 1, false)["cost"];
+        EXPECT_EQ(cost.contains("mean_bits"), wanted);
+        const std::vector<std::string> names = evaluator.wanted();
+        EXPECT_EQ(std::find(names.begin(), names.end(), "mean cost") != names.end(), wanted);
+        if (!wanted) continue;
+        EXPECT_GT(cost["mean_of"]["slabs"], 10);
+        EXPECT_GT(cost["mean_bits"], cost["word_bits"]);
+        EXPECT_LT(cost["mean_bits"], cost["bits"]);
+        double bits = 0;  // of one stage, by its list
+        for (const Json& m : cost["stages"]["interpolation"]["multipliers"])
+            bits += m["mean"].get<double>() * m["widths"][0].get<double>() * m["widths"][1].get<double>();
+        EXPECT_NEAR(bits, cost["stages"]["interpolation"]["mean_multiplier_bits"].get<double>(), 1e-9 * bits);
+    }
+}
+
 // -------------------------------------------------------------------------------------------- cost
 
 TEST(SweepCost, IsTheSumOfWidthsAndOfProductsOfOperandWidths) {

@@ -6,7 +6,7 @@ const state = { against: '', channel: 'color', figure: 'rmse', cost: 'bits', fil
 
 const kFigures = { rmse: 'RMSE in LSB8', max: 'greatest error in LSB8', bias: 'bias in LSB8', psnr: 'PSNR in dB', ssim: 'SSIM' };
 const kChannels = { color: 'colour, linear light', alpha: 'opacity', color_srgb: 'colour on an sRGB display' };
-const kCosts = { bits: 'bits (words + operations)', word_bits: 'bits of words', multiplier_bits: 'bits of multipliers', divider_bits: 'bits of dividers', rounding_bits: 'bits of roundings', lookup_bits: 'bits looked up', table_bits: 'bits of tables', table_bytes: 'bytes of tables', pixel_bits: 'bits of a pixel', ms: 'ms a frame' };
+const kCosts = { bits: 'bits (words + operations)', word_bits: 'bits of words', multiplier_bits: 'bits of multipliers', divider_bits: 'bits of dividers', rounding_bits: 'bits of roundings', mean_bits: 'bits in a sample, mean (words + operations)', lookup_bits: 'bits looked up', table_bits: 'bits of tables', table_bytes: 'bytes of tables', pixel_bits: 'bits of a pixel', ms: 'ms a frame' };
 // LSB8: what was asked for, or what rounding to 8 bits may cost anyway.
 const bound = () => data.answer.bound;
 const boundName = () => bound() === 0.5 ? 'half an LSB8' : `${number(bound())} LSB8`;

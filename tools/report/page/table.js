@@ -9,7 +9,7 @@ function startTable() {
   const error = (figure) => (e, p) => figuresOf(p)?.[figure];
   all.push({ name: 'RMSE', of: error('rmse') }, { name: 'greatest', of: error('max') }, { name: 'bias', of: error('bias') }, { name: 'PSNR', of: error('psnr') }, { name: 'SSIM', digits: 6, of: error('ssim') });
   all.push({ name: 'ms', of: (e, p) => p.ms }, { name: 'path', word: true, of: (e, p) => p.path && p.path + (p.model ? ' (model)' : '') }, { name: 'samples', of: (e, p) => p.samples });
-  all.push({ name: 'bits', of: (e, p) => p.cost?.bits }, { name: 'table bytes', of: (e, p) => p.cost?.table_bytes });
+  all.push({ name: 'bits', of: (e, p) => p.cost?.bits }, { name: 'mean bits', of: (e, p) => p.cost?.mean_bits }, { name: 'table bytes', of: (e, p) => p.cost?.table_bytes });
   all.push({ name: 'C + T - 1', of: (e, p) => p.conservation && Math.max(-p.conservation.least_lsb8, p.conservation.most_lsb8) }, { name: 'T stuck', of: (e, p) => p.stuck?.stuck_samples });
   columns = all.filter((c) => entries.some((e) => (c.of(e, points[e.point]) ?? null) !== null));
   $('all-rows').addEventListener('click', () => { state.rows = Infinity; table(); });
