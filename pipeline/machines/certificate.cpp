@@ -153,7 +153,7 @@ std::optional<std::string> what_is_not_bounded(const Plan& plan) {
                "analytic, "
                "sobel";
     if (plan.gradient.exaggerated.wanted) return "shading.exaggeration is not bounded yet; allowed: 0";
-    if (lights_fade(plan.inside.rule))
+    if (lights_fade(plan.inside.rule) || lights_at_places(plan.inside.rule))
         return fmt::format("shading.inside {} is not bounded yet; allowed: mean, front, middle, adaptive",
                            name_of(plan.inside.rule));
     if (plan.inside.rule == InsideRule::adaptive && plan.inside.one_alpha < 1 << 15)

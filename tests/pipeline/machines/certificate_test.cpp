@@ -277,8 +277,15 @@ TEST(Certificate, RefusesWhatItDoesNotBoundInOneLine) {
     };
     using ::testing::HasSubstr;
     const std::string dark = "lights=[]", pc = "classification.method=pc", small = "volume.dims=8";
-    EXPECT_THAT(refusal({small, "classification.method=pi2d", "shading.inside=linear"}),
-                HasSubstr("shading.inside linear is not bounded yet"));
+    EXPECT_THAT(refusal({small, "classification.method=pi2d"}),
+                HasSubstr("shading.inside two_point is not bounded yet"))
+        << "the default";
+    for (const char* rule : {"linear", "nlpi", "centroid", "two_point"})
+        EXPECT_THAT(refusal({small, "classification.method=pips", std::string("shading.inside=") + rule}),
+                    HasSubstr(fmt::format("shading.inside {} is not bounded yet", rule)));
+    EXPECT_THAT(refusal({small, pc, "shading.gradient=cubic_spline"}),
+                HasSubstr("cubic_spline is not bounded"));
+    EXPECT_THAT(refusal({small, pc, "shading.exaggeration=1"}), HasSubstr("exaggeration is not bounded"));
     EXPECT_THAT(refusal({small, "classification.method=pips", "shading.inside=adaptive",
                          "precision.slab_alpha=u1.12"}),
                 HasSubstr("15 or more fraction bits"));
