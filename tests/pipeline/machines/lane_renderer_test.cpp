@@ -48,33 +48,35 @@ TEST(LaneRenderer, TakesTheSameBitsFromCellsWhateverRoomTheyHave) {
 
 // A lane holds 31 bits and a sign; the sum of a slab's two ends has one bit more than a gradient.
 TEST(LaneRenderer, LeavesGradientsThatAreWiderThanALaneToTheModel) {
-    const auto with = [](const char* gradient, const char* method) {
+    const auto with = [](const char* gradient, const char* method, const char* inside) {
         return std::vector<std::string>{"volume.procedural=shells",
                                         "volume.dims=32",
                                         std::string("precision.gradient=") + gradient,
                                         std::string("classification.method=") + method,
+                                        std::string("shading.inside=") + inside,
                                         "image.width=48",
                                         "image.height=48"};
     };
     RenderOptions lanes;
     lanes.path = Path::lanes;
-    for (const auto& [method, widest, too_wide] :
-         {std::tuple{"pc", "s12.19", "s12.20"}, std::tuple{"pips", "s12.18", "s12.19"}}) {
+    // A mean is kept as a sum, of one bit more; between two places a difference is multiplied.
+    for (const auto& [method, inside, widest, too_wide, why] :
+         {std::tuple{"pc", "front", "s12.19", "s12.20", "s12.20 is wider than a lane's"},
+          std::tuple{"pips", "mean", "s12.18", "s12.19", "s12.19 is wider than a lane's"},
+          std::tuple{"pips", "two_point", "s12.19", "s12.20", "factors of 33 bits"}}) {
         RenderOptions model;
         model.path = Path::model;
-        EXPECT_EQ(picture_hash(rendered(with(widest, method), lanes).image),
-                  picture_hash(rendered(with(widest, method), model).image))
+        EXPECT_EQ(picture_hash(rendered(with(widest, method, inside), lanes).image),
+                  picture_hash(rendered(with(widest, method, inside), model).image))
             << method;
         try {
-            rendered(with(too_wide, method), lanes);
+            rendered(with(too_wide, method, inside), lanes);
             ADD_FAILURE() << method << ": " << too_wide << " was taken by lanes";
         } catch (const std::exception& refused) {
-            EXPECT_THAT(refused.what(),
-                        testing::HasSubstr(std::string("gradient: ") + too_wide + " is wider than a lane's"))
-                << method;
+            EXPECT_THAT(refused.what(), testing::HasSubstr(std::string("gradient: ") + why)) << method;
         }
-        EXPECT_EQ(picture_hash(rendered(with(too_wide, method), {}).image),
-                  picture_hash(rendered(with(too_wide, method), model).image))
+        EXPECT_EQ(picture_hash(rendered(with(too_wide, method, inside), {}).image),
+                  picture_hash(rendered(with(too_wide, method, inside), model).image))
             << method;
     }
 }
