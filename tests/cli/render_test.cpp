@@ -334,7 +334,7 @@ TEST_F(Render, AMappedVolumeLargerThanTheMemoryAllowedIsRendered) {
         "'transfer_function.points=[[99, 1, 1, 1, 0], [120, 1, 0.5, 1, 0.9]]' ";
     const auto whole = squint(render).json()["pictures"][0];
     for (const std::string layout : {"linear", "cells"}) {
-        const Outcome outcome = squint(render + "--max-memory 8M --layout " + layout);
+        const Outcome outcome = squint((render + "--max-memory 8M --layout ").append(layout));
         ASSERT_EQ(outcome.code, 0) << outcome.err;
         const auto picture = outcome.json()["pictures"][0];
         EXPECT_EQ(picture["hash"], whole["hash"]);
@@ -395,8 +395,8 @@ Outcome interrupt(const fs::path& folder, const std::string& arguments, int sign
     kill(child, signal);
     int status = 0;
     waitpid(child, &status, 0);
-    const Outcome outcome{WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status),
-                          contents(folder / ".stdout"), contents(folder / ".stderr")};
+    Outcome outcome{WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status),
+                    contents(folder / ".stdout"), contents(folder / ".stderr")};
     fs::remove(folder / ".stdout"), fs::remove(folder / ".stderr");
     return outcome;
 }
