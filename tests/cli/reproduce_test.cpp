@@ -83,7 +83,7 @@ TEST_F(Reproduce, TimedTablesAreLeftOutUntilAskedFor) {
     const Outcome timed = without_data(
         "lee_shin table_4 -o out --size 8x8 --set camera.turntable=1 --set classification.table_size=64");
     EXPECT_EQ(timed.code, 0) << timed.err;
-    EXPECT_THAT(timed.err, HasSubstr("lee_shin table_4: about 40 min 0 s on two cores"));
+    EXPECT_THAT(timed.err, HasSubstr("lee_shin table_4: about 25 min 0 s on two cores"));
     EXPECT_THAT(timed.err, HasSubstr("20 made"));
 }
 
