@@ -96,8 +96,9 @@ TEST(Spline, AQuadraticFieldHasItsOwnSlopes) {
             return Word{2000} + a * x * x + b * x * y + c * y * y + d * z * z + e * y * z + a * b * x;
         });
         for (const int t : {0, 1, 3, 4, 5, 7, 8}) {
-            const double x = t / 8.0, y = (8 - t) / 8.0, z = (t / 2) / 8.0;
-            const Vector found = gradient_of(field, {t * 32, (8 - t) * 32, t / 2 * 32});
+            const int half = t / 2;
+            const double x = t / 8.0, y = (8 - t) / 8.0, z = half / 8.0;
+            const Vector found = gradient_of(field, {t * 32, (8 - t) * 32, half * 32});
             const double exact[] = {2 * a * x + b * y + a * b, b * x + 2 * c * y + e * z, 2 * d * z + e * y};
             // Three levels round, the first two times the sums of |weights|, 1.25 each.
             for (std::size_t axis = 0; axis < 3; ++axis)
