@@ -1,6 +1,7 @@
 #include "pipeline/render.h"
 
 #include "core/error.h"
+#include "core/threads.h"
 #include "pipeline/machines/lanes/blocks_met.h"
 #include "pipeline/machines/lanes/lane_renderer.h"
 #include "pipeline/machines/model.h"
@@ -13,7 +14,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <thread>
 
 namespace squint {
 namespace {
@@ -49,9 +49,7 @@ Rendering render(const Plan& plan, const RenderOptions& options) {
     add_channels(plan.scene, image);
 
     RenderStatistics& statistics = result.statistics;
-    statistics.threads = options.threads > 0
-                             ? options.threads
-                             : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    statistics.threads = threads_for(options.threads);
     const std::vector<Tile> tiles = tiles_of(image.width, image.height, std::max(1, options.tile));
     std::vector<TileStatistics> per_tile(tiles.size());
     std::atomic<std::size_t> done{0};

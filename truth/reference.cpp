@@ -1,6 +1,7 @@
 #include "truth/reference.h"
 
 #include "core/portable_math.h"
+#include "core/threads.h"
 #include "pipeline/render.h"
 #include "truth/reference_field.h"
 #include "truth/reference_light.h"
@@ -13,7 +14,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <thread>
 #include <vector>
 
 namespace squint {
@@ -455,8 +455,7 @@ Image render_reference(const Plan& plan, const ReferenceOptions& options) {
                     image.channels[c].values[at] = static_cast<float>(pixel[c]);
             }
     };
-    const unsigned processors = std::max(1u, std::thread::hardware_concurrency());
-    tbb::task_arena arena(options.threads > 0 ? options.threads : static_cast<int>(processors));
+    tbb::task_arena arena(threads_for(options.threads));
     arena.execute([&] {
         tbb::parallel_for(0, tiles, [&](int tile) {
             if (options.cancelled && *options.cancelled) stopped = true;

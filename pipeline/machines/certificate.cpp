@@ -1,6 +1,7 @@
 #include "pipeline/machines/certificate.h"
 
 #include "core/error.h"
+#include "core/threads.h"
 #include "pipeline/machines/certificate/methods.h"
 #include "pipeline/machines/certificate/premultiplied.h"
 #include "pipeline/machines/certificate/ray.h"
@@ -17,7 +18,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <thread>
 #include <vector>
 
 namespace squint {
@@ -150,16 +150,14 @@ std::optional<std::string> what_is_not_bounded(const Plan& plan) {
     if (!plan.lit) return {};
     if (plan.gradient.rule == GradientRule::cubic_spline)
         return "shading.gradient cubic_spline is not bounded yet; allowed: central, central_samples, "
-               "analytic, "
-               "sobel";
+               "analytic, sobel";
     if (plan.gradient.exaggerated.wanted) return "shading.exaggeration is not bounded yet; allowed: 0";
     if (lights_fade(plan.inside.rule) || lights_at_places(plan.inside.rule))
         return fmt::format("shading.inside {} is not bounded yet; allowed: mean, front, middle, adaptive",
                            name_of(plan.inside.rule));
     if (plan.inside.rule == InsideRule::adaptive && plan.inside.one_alpha < 1 << 15)
         return "shading.inside adaptive cuts other slabs where precision.slab_alpha has few bits; allowed: "
-               "15 or more "
-               "fraction bits";
+               "15 or more fraction bits";
     return {};
 }
 
@@ -175,9 +173,7 @@ Certificate certify(const Plan& plan, const CertificateOptions& options) {
     }
     std::vector<Row> rows(static_cast<std::size_t>(plan.camera.height));
     std::atomic<bool> stopped{false};
-    tbb::task_arena arena(options.threads > 0
-                              ? options.threads
-                              : static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
+    tbb::task_arena arena(threads_for(options.threads));
     const auto certify_all = [&](const auto& method) {
         arena.execute([&] {
             tbb::parallel_for(0, plan.camera.height, [&](int row) {

@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/portable_math.h"
+#include "core/threads.h"
 #include "pipeline/machines/certificate/payers.h"
 #include "pipeline/machines/scene_bound/beams.h"
 #include "pipeline/plan/ranges.h"
@@ -17,7 +18,6 @@
 #include <cmath>
 #include <map>
 #include <queue>
-#include <thread>
 #include <tuple>
 #include <vector>
 
@@ -296,9 +296,7 @@ SceneBound bound_scene(const Plan& plan, const SceneBoundOptions& options) {
 
     SceneBound b;
     b.samples = static_cast<std::int64_t>(most_steps(plan)) + 1;
-    tbb::task_arena arena(options.threads > 0
-                              ? options.threads
-                              : static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
+    tbb::task_arena arena(threads_for(options.threads));
     arena.execute([&] {
         const CostBlocks blocks(plan, errors, costs);
         const Beams beams(plan, errors, blocks, compositing);

@@ -124,8 +124,7 @@ AutoFormats choose_formats(Scene& scene, const std::shared_ptr<const Volume>& vo
     result.bits = choice.pictures.cost(bits), result.bits_of_default = choice.pictures.cost(choice.bits);
     result.notes.push_back(fmt::format(
         "precision auto: no decided ray of {} errs by more than {:.3g} LSB8 by rounding (budget {:g}){}; "
-        "{:.0f} bits "
-        "by the "
+        "{:.0f} bits by the "
         "tally, `default` has {:.0f}",
         proof.rays, proof.most, budget,
         result.one_in > 1 ? fmt::format(", one row and column in {}: --bound certifies all", result.one_in)

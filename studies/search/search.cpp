@@ -2,6 +2,7 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/threads.h"
 #include "pipeline/record.h"
 #include "pipeline/render.h"
 #include "scene/toml.h"
@@ -71,7 +72,7 @@ class Searcher {
     explicit Searcher(const Settings& settings)
         : s_(settings),
           sweep_(sweep_of(settings)),
-          threads_(settings.threads > 0 ? settings.threads : processors()),
+          threads_(threads_for(settings.threads)),
           evaluator_(sweep_, settings.folder, settings.cancelled),
           wanted_(evaluator_.wanted()) {}
 

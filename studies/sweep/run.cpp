@@ -2,6 +2,7 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/threads.h"
 #include "pipeline/render.h"
 #include "scene/toml.h"
 #include "studies/sweep/run_folder.h"
@@ -51,7 +52,7 @@ class Runner {
         : sweep_(sweep),
           options_(options),
           dry_(dry),
-          threads_(options.threads > 0 ? options.threads : processors()),
+          threads_(threads_for(options.threads)),
           evaluator_(sweep, dry ? "" : options.folder, options.cancelled) {}
 
     RunSummary run() {

@@ -13,10 +13,6 @@
 
 namespace squint::sweep {
 
-inline int processors() {
-    return static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-}
-
 /// Calls f(0) ... f(count - 1), each on one of `threads` threads.  The first exception stops the rest and is
 /// rethrown here.
 template <class F>
