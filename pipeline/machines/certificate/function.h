@@ -23,6 +23,10 @@ struct Reach {
 inline double full_step(const Plan& plan) {
     return plan.projection_mode ? plan.entries.unit_distance : plan.step_world;
 }
+/// Of an optical depth.
+inline double opacity_of(double depth) {
+    return -portable::expm1(-depth);
+}
 /// The function as no word has it: extinction of a full step and colour, linear between entries; opaque entries.
 class Function {
   public:
@@ -41,7 +45,7 @@ class Function {
         Function f(plan);
         for (std::size_t i = 0; i < f.opaque_.size(); ++i) {
             double& value = f.curve_[depth][i];
-            value = f.opaque_[i] ? 1 : is_opacity ? -portable::expm1(-value) : std::min(value, 1.0);
+            value = f.opaque_[i] ? 1 : is_opacity ? opacity_of(value) : std::min(value, 1.0);
             for (std::size_t c = 0; c < 3; ++c) f.curve_[c][i] *= value;
         }
         return f;

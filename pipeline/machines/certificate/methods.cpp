@@ -16,13 +16,6 @@ namespace squint {
 
 using namespace HWY_NAMESPACE;
 
-namespace {
-
-double opacity(double depth) {
-    return -portable::expm1(-depth);
-}
-}  // namespace
-
 Slab<Bounded> classify(const BoundedPostClassification& m, const Bounded& input, const Bounded&,
                        const Bounded& length) {
     const EntryLookup& e = m.words.entries;
@@ -56,8 +49,8 @@ Slab<Bounded> classify(const BoundedPostClassification& m, const Bounded& input,
     const Function::Opaque here = f.opaque(x, x), near = f.opaque(low, high);
     const double depth = f.at(Function::depth, x) * l;
     const Reach depths = f.over(Function::depth, low, high);
-    const Reach curve{opacity(depths.low * std::max(l - l_off, 0.0)),
-                      opacity(depths.high * std::min(l + l_off, 1.0))};
+    const Reach curve{opacity_of(depths.low * std::max(l - l_off, 0.0)),
+                      opacity_of(depths.high * std::min(l + l_off, 1.0))};
     Shares error;
     if (near.all) {
         add_local(error, std::abs(got - 1), {{index_of(Wire::slab_alpha), 0.0}});
@@ -66,7 +59,7 @@ Slab<Bounded> classify(const BoundedPostClassification& m, const Bounded& input,
         error[kWallsPay] += std::max(got - curve.low, 0.0);
         add_local(error, std::abs(got - 1), {{index_of(Wire::slab_alpha), 0.0}});
     } else {
-        const double exact = opacity(depth), decay = 1 - curve.low;
+        const double exact = opacity_of(depth), decay = 1 - curve.low;
         const double u_alpha = unit_of(e.to_alpha) / alpha_one;
         if (length.v < (Int128{1} << e.length_fraction) || l_off > 0) {
             const double extinction = 0.5 * std::ldexp(l * decay, -e.extinction_fraction),
@@ -76,7 +69,8 @@ Slab<Bounded> classify(const BoundedPostClassification& m, const Bounded& input,
                        {index_of(Wire::slab_depth), depth_unit},
                        {index_of(Wire::slab_alpha), unit_of(e.opacity.to_alpha) / alpha_one}});
             // What is left of the curve's swing where the length is what it is.
-            const double swing = std::max(opacity(depths.high * l) - exact, exact - opacity(depths.low * l));
+            const double swing =
+                std::max(opacity_of(depths.high * l) - exact, exact - opacity_of(depths.low * l));
             to_input(error, swing);
             if (l_off > 0) error.add(length.error, std::max(curve.from(exact) - swing, 0.0) / length.most());
         } else {
@@ -84,7 +78,8 @@ Slab<Bounded> classify(const BoundedPostClassification& m, const Bounded& input,
             const double way = std::ldexp(in_double(row.fraction), e.row_bits - e.input_fraction);
             const double from = std::ldexp(in_double(row.entry), -e.row_bits),
                          to = std::min(from + std::ldexp(1.0, -e.row_bits), static_cast<double>(f.last()));
-            const double a = opacity(f.at(Function::depth, from)), b = opacity(f.at(Function::depth, to));
+            const double a = opacity_of(f.at(Function::depth, from)),
+                         b = opacity_of(f.at(Function::depth, to));
             const double chord = a + way * (b - a);
             error[kRowsPay] += std::abs(chord - exact);
             const int table_fraction = e.to_alpha.shift + e.alpha_fraction - (e.input_fraction - e.row_bits);
@@ -167,8 +162,8 @@ Slab<Bounded> classify(const BoundedPowerSeries& m, const Bounded& front, const 
         const double by_front = l * steep * from_off / 2, by_back = l * steep * to_off / 2,
                      by_length = l_off * depths.high;
         const double shift = by_front + by_back + by_length, depth = -portable::log1p(-here.alpha);
-        const Reach moved{opacity(std::max(depth - shift, std::max(l - l_off, 0.0) * depths.low)),
-                          opacity(std::min(depth + shift, std::min(l + l_off, 1.0) * depths.high))};
+        const Reach moved{opacity_of(std::max(depth - shift, std::max(l - l_off, 0.0) * depths.low)),
+                          opacity_of(std::min(depth + shift, std::min(l + l_off, 1.0) * depths.high))};
         to_ends(alpha_error, std::max(moved.from(here.alpha), 0.0), by_front, by_back, by_length);
         // x dK = int (c - K) dtau + int tau dc.
         const double mean = l > 0 ? depth / l : -portable::log1p(-seen.alpha),
@@ -231,7 +226,7 @@ Slab<Bounded> classify(const BoundedPowerSeries& m, const Bounded& front, const 
                         from_off, to_off, l_off > 0 ? l_off : 0);
             }
         } else {
-            const double least = opacity(depths.low * std::max(l - l_off, 0.0));
+            const double least = opacity_of(depths.low * std::max(l - l_off, 0.0));
             alpha_error[kWallsPay] += std::max(1 - here.alpha, here.alpha - least);
             for (std::size_t c = 0; c < 3; ++c)
                 color_error[c][kWallsPay] += std::max(reach[c].from(straight[c]), 0.0);

@@ -31,9 +31,9 @@ struct SeriesKernel {
 /// LEG(2 to 4): w = sum (2j + 1) (-1)^j P_j(2y - 1) i_j(x / 2) / i_0(x / 2), up to the depth at which slabs are cut.
 SeriesKernel series_kernel(int order, bool legendre);
 
-/// PIPS(n) and LEG(n).  Without rounding a slab is the mean extinction on its way from one input to the other, and the
-/// mean colour weighted by it: moving the ends by e moves the mean of a curve by its slope times e, however short the
-/// way is.
+/// PIPS(n) and LEG(n).  Without rounding a slab is the mean extinction on its way from one input to the other, and
+/// the mean colour weighted by it: moving the ends by e moves the mean of a curve by its slope times e, for ways of
+/// any length.
 struct BoundedPowerSeries {
     static constexpr bool kNeedsBack = true;
     std::variant<const PowerSeriesOfOrder1*, const MomentSeries*> words;

@@ -16,10 +16,6 @@ using namespace HWY_NAMESPACE;
 
 namespace {
 
-double opacity_of(double depth) {
-    return -portable::expm1(-depth);
-}
-
 /// Of c alpha, and of alpha.
 struct SlabReach {
     std::array<Reach, 3> color;

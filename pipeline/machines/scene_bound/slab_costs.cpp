@@ -15,9 +15,6 @@ namespace {
 constexpr int kMostBins = 4096;  // where rows need no more
 constexpr int kErrors = 9;
 
-double opacity_of(double depth) {
-    return -portable::expm1(-depth);
-}
 float not_less(double x) {
     const auto y = static_cast<float>(x);
     return static_cast<double>(y) < x ? std::nextafter(y, std::numeric_limits<float>::infinity()) : y;
