@@ -116,11 +116,15 @@ int run(const HardArguments& a) {
     Json json = Json::object();
     std::string remarks;
     int beyond = 0;
-    for (const auto& [name, scene] : cases_of(a)) {
+    const std::vector<Case> cases = cases_of(a);
+    StatusLine line(true);
+    for (const auto& [name, scene] : cases) {
         std::vector<std::string> notes;
         const auto volume = load(scene, notes);
         rows.push_back({name});
         for (const NamedMethod& method : methods) {
+            line.show(
+                fmt::format("{}, {}: scene {} of {}", name, method.name, rows.size() - 1, cases.size()));
             const Outcome outcome = outcome_of(a, scene, method, volume);
             rows.back().push_back(cell_of(a, outcome));
             json[name][method.name] = json_of(a, outcome);
@@ -132,6 +136,7 @@ int run(const HardArguments& a) {
                     remarks += fmt::format("{}: {}\n", name, note);
         }
     }
+    line.clear();
     if (a.json) {
         print_json({{"schema", "squint.hard/1"}, {"scenes", json}});
     } else {
@@ -142,8 +147,7 @@ int run(const HardArguments& a) {
                       "LSB8: {} views, {} pixels a side\n\n",
                       a.views, fmt::join(a.sizes, " and "))
                 : "Largest error of one slab against the exact integral, colour or opacity, in LSB8 (! "
-                  "outside "
-                  "0 <= C <= alpha <= 1)\n\n";
+                  "outside 0 <= C <= alpha <= 1)\n\n";
         print(head + table_text(rows) + (remarks.empty() ? "" : "\n" + remarks));
     }
     return beyond ? kComparisonFailed : kDone;
