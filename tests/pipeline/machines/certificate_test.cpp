@@ -321,11 +321,7 @@ TEST_P(EveryRule, HalvedIsExceededByAPictureOfItsOwn) {
             Plan plan = make_plan(scene, c.plan.volume);
             if (std::find(plan.used_wires.begin(), plan.used_wires.end(), wire) == plan.used_wires.end())
                 continue;
-            Spec coarse = plan.specs[wire];
-            coarse.format.fraction_bits =
-                std::min(static_cast<int>(draw.between(2, 9)), coarse.format.fraction_bits);
-            coarse.rounding = draw.one_of({Rounding::trn, Rounding::rnd_conv});
-            scene.precision.override_[static_cast<std::size_t>(wire)] = to_string(coarse);
+            scene.precision.override_[static_cast<std::size_t>(wire)] = draw_coarse(draw, plan.specs[wire]);
             plan = make_plan(scene, c.plan.volume);
             CertificateOptions options;
             options.channels = true, options.threads = 1;

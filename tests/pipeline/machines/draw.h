@@ -4,11 +4,13 @@
 #include "core/procedural.h"
 #include "scene/scene.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
 #include <iterator>
 #include <random>
+#include <string>
 
 namespace squint {
 
@@ -57,6 +59,13 @@ inline const ProceduralField& draw_field(Draw& draw, int noises) {
     const auto which =
         static_cast<std::size_t>(draw.between(0, static_cast<std::int64_t>(fields.size()) - 1 + noises));
     return which < fields.size() ? fields[which] : noise_field();
+}
+
+/// A wire's setting with few fraction bits, 2 to 9 where it has so many, cut or rounded.
+inline std::string draw_coarse(Draw& draw, Spec spec) {
+    spec.format.fraction_bits = std::min(static_cast<int>(draw.between(2, 9)), spec.format.fraction_bits);
+    spec.rounding = draw.one_of({Rounding::trn, Rounding::rnd_conv});
+    return to_string(spec);
 }
 
 }  // namespace squint

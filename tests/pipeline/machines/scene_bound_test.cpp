@@ -252,11 +252,7 @@ TEST_P(EverySceneRule, HalvedIsExceededByASceneOfItsOwn) {
             Plan plan = make_plan(d.scene, d.volume);
             if (std::find(plan.used_wires.begin(), plan.used_wires.end(), wire) == plan.used_wires.end())
                 continue;
-            Spec coarse = plan.specs[wire];
-            coarse.format.fraction_bits =
-                std::min(static_cast<int>(draw.between(2, 9)), coarse.format.fraction_bits);
-            coarse.rounding = draw.one_of({Rounding::trn, Rounding::rnd_conv});
-            d.scene.precision.override_[static_cast<std::size_t>(wire)] = to_string(coarse);
+            d.scene.precision.override_[static_cast<std::size_t>(wire)] = draw_coarse(draw, plan.specs[wire]);
             plan = make_plan(d.scene, d.volume);
             const SceneBound bound = bound_with(plan, 1, 400);
             for (int view = 0; view < 3; ++view)

@@ -3,6 +3,7 @@
 
 #include "fixedpoint/words.h"
 #include "pipeline/stages/presets.h"
+#include "tests/pipeline/stages/neighbourhoods.h"
 
 #include <gtest/gtest.h>
 
@@ -31,20 +32,6 @@ GradientStage stage_of(GradientRule rule, int fraction_bits, int normal_bits,
     s.normal_fraction = normal_bits;
     s.to_normal = Rescale(-kNormalGuard, Spec{{1, normal_bits, true}, rounding, Overflow::sat});
     return s;
-}
-
-/// value(x, y, z) on the 4x4x4 voxels about a cell whose lower corner is the origin.
-template <class F>
-Neighbourhood<Word> neighbourhood_of(F&& value) {
-    Neighbourhood<Word> n;
-    for (int i = 0; i < 64; ++i)
-        n.voxel[static_cast<std::size_t>(i)] = value((i & 3) - 1, (i >> 2 & 3) - 1, (i >> 4) - 1);
-    return n;
-}
-
-Vector gradient_of(const GradientStage& s, const Neighbourhood<Word>& n, const Vector& weight) {
-    return {voxel_difference(s, n, weight, 0), voxel_difference(s, n, weight, 1),
-            voxel_difference(s, n, weight, 2)};
 }
 
 double length_of(const Vector& v, double one) {

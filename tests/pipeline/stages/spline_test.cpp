@@ -3,6 +3,7 @@
 #include "pipeline/slab-inl.h"
 #include "pipeline/stages/faces.h"
 #include "pipeline/stages/gradient-inl.h"
+#include "tests/pipeline/stages/neighbourhoods.h"
 #include "tests/truth/reference_cases.h"
 
 #include <gtest/gtest.h>
@@ -29,17 +30,8 @@ GradientStage spline_stage() {
     s.to_second = s.to_gradient = Rescale(kFraction + kSplineBits, gradient);
     return s;
 }
-template <class F>
-Neighbourhood<Word> neighbourhood_of(F&& value) {
-    Neighbourhood<Word> n;
-    for (int i = 0; i < 64; ++i)
-        n.voxel[static_cast<std::size_t>(i)] = value((i & 3) - 1, (i >> 2 & 3) - 1, (i >> 4) - 1);
-    return n;
-}
 Vector gradient_of(const Neighbourhood<Word>& n, const Vector& weight) {
-    const GradientStage s = spline_stage();
-    return {voxel_difference(s, n, weight, 0), voxel_difference(s, n, weight, 1),
-            voxel_difference(s, n, weight, 2)};
+    return gradient_of(spline_stage(), n, weight);
 }
 
 TEST(Spline, ItsWeightsSumToOneAtEveryPlaceAndAreTheMirroredPlacesMirrored) {
