@@ -5,8 +5,8 @@
 //
 // A scene's volume behind a function of one wall; a ray's own first hit is sought in doubles, 48 samples a voxel.
 // Missed: it goes on behind it.  Late: the slab that it ends in begins over a voxel behind it.  Speed: processor
-// time of a frame that looks twice over one that does not, the median of paired frames of configs/bench.
-// Prints Markdown.
+// time of a frame that looks twice over one that does not, the median of paired frames of configs/bench.  It
+// prints Markdown.
 #include "bench/support/support.h"
 #include "core/error.h"
 

@@ -34,7 +34,7 @@ class Flag {
     Flag& shows_default();
     Flag& shows_default(const char* text);
 
-    // For Flags::then().
+    // What Flags::then() asks.
     bool given() const;
     bool before(const Flag& other) const;
 
@@ -43,8 +43,8 @@ class Flag {
     CLI::Option* option_;
 };
 
-/// Describes words ("scene") and flags ("-o,--output") of a verb.  The variables outlive the reading of the
-/// command line.
+/// Describes words ("scene") and flags ("-o,--output") of a verb.  The variables must live until the command
+/// line was read.
 class Flags {
   public:
     Flags(CLI::App& verb, const std::string& command) : verb_(&verb), command_(&command) {}

@@ -12,8 +12,8 @@ namespace squint::cli {
 
 struct Verb {
     const char *name, *heading, *help, *footer;  // heading: the job under which help lists it
-    /// Describes its flags.  What it returns, called after they were read, runs the verb: an exit code, or an
-    /// InputError.
+    /// Describes its flags.  What it returns is called after they were read, and runs the verb: it returns an
+    /// exit code, or throws InputError.
     std::function<int()> (*describe)(Flags&);
 };
 
