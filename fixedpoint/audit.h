@@ -20,12 +20,13 @@ struct WireStatistics {
     std::int64_t underflowed = 0;  // values that were not zero and became zero
     std::int64_t smallest = std::numeric_limits<std::int64_t>::max();
     std::int64_t largest = std::numeric_limits<std::int64_t>::min();
+    std::uint64_t ones = 0;                    // bit b: one of the absolute raw values has it
     std::array<std::int64_t, 64> magnitude{};  // [b]: values whose absolute raw value has b bits
     std::vector<TraceEvent>* trace = nullptr;  // where every event is recorded; null: nowhere
 
     void merge(const WireStatistics& other) {
         count += other.count, inexact += other.inexact, saturated += other.saturated,
-            wrapped += other.wrapped, underflowed += other.underflowed;
+            wrapped += other.wrapped, underflowed += other.underflowed, ones |= other.ones;
         if (other.smallest < smallest) smallest = other.smallest;
         if (other.largest > largest) largest = other.largest;
         for (std::size_t b = 0; b < magnitude.size(); ++b) magnitude[b] += other.magnitude[b];

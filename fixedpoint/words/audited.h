@@ -78,6 +78,7 @@ inline Audited record(Int128 rounded, bool inexact, double exact, const Rescale&
         if (raw != rounded) ++(to.wraps ? s->wrapped : s->saturated);
         s->smallest = std::min(s->smallest, value);
         s->largest = std::max(s->largest, value);
+        s->ones |= static_cast<std::uint64_t>(absolute(value));
         ++s->magnitude[static_cast<std::size_t>(bit_length(absolute(value)))];
         if (s->trace) s->trace->push_back({to.wire, exact, value});
     }

@@ -6,6 +6,7 @@ namespace squint {
 thread_local WordNeeds Range::needs;
 thread_local std::uint64_t Range::limited = 0;
 thread_local std::uint64_t Range::used = 0;
+thread_local std::map<int, Range>* Range::of_wires = nullptr;
 
 namespace {
 
@@ -123,6 +124,21 @@ Range vector_length(const std::array<Range, 3>& v, int guard) {
     noted_in_passing(0, squares);
     return noted({0, static_cast<Int128>(std::sqrt(static_cast<double>(squares))) + 1});
 }
+namespace {
+void note_range(int wire, Range values) {
+    if (!Range::of_wires || wire < 0) return;
+    const auto [found, first] = Range::of_wires->try_emplace(wire, values);
+    if (!first) found->second = select({}, found->second, values);
+}
+// What a wire carries of rounded values.
+Range arrived(Range rounded, const Rescale& to) {
+    note_range(to.wire, rounded);
+    if (rounded.low >= to.lowest && rounded.high <= to.highest) return rounded;
+    if (to.wire >= 0) Range::limited |= std::uint64_t{1} << to.wire;
+    if (to.wraps) return {to.lowest, to.highest};
+    return {limit(rounded.low, to), limit(rounded.high, to)};
+}
+}  // namespace
 Range quantise(Range x, const Rescale& to) {
     note_wire(WordTag<Range>{}, to.wire);
     Range rounded = x;
@@ -132,10 +148,7 @@ Range quantise(Range x, const Rescale& to) {
         noted({x.low - to.bias, x.high + to.bias + to.to_even + to.to_zero});
         rounded = {round_off(x.low, to), round_off(x.high, to)};
     }
-    if (rounded.low >= to.lowest && rounded.high <= to.highest) return rounded;
-    if (to.wire >= 0) Range::limited |= std::uint64_t{1} << to.wire;
-    if (to.wraps) return {to.lowest, to.highest};
-    return {limit(rounded.low, to), limit(rounded.high, to)};
+    return arrived(rounded, to);
 }
 Range quotient(Range numerator, Range denominator, const Rescale& to) {
     note_wire(WordTag<Range>{}, to.wire);
@@ -150,10 +163,7 @@ Range quotient(Range numerator, Range denominator, const Rescale& to) {
     // saturate only.
     const int lanes = to.wraps || to.width > 48 ? 65 : to.width > 22 ? 33 : 0;
     Range::needs.lane_bits = std::max(Range::needs.lane_bits, lanes);
-    const Range q{scaled_low / largest, scaled_high / smallest + 1};
-    if (q.high <= to.highest) return q;
-    if (to.wire >= 0) Range::limited |= std::uint64_t{1} << to.wire;
-    return to.wraps ? Range{to.lowest, to.highest} : Range{std::min<Int128>(q.low, to.highest), to.highest};
+    return arrived({scaled_low / largest, scaled_high / smallest + 1}, to);
 }
 
 namespace {

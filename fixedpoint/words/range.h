@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 
 namespace squint {
 
@@ -28,6 +29,7 @@ struct Range {
     static thread_local WordNeeds needs;
     static thread_local std::uint64_t limited;  // bit w: wire w can saturate or wrap
     static thread_local std::uint64_t used;     // bit w: a value passes wire w or is read from its table
+    static thread_local std::map<int, Range>* of_wires;  // gets the values on each wire, before limits
 };
 inline void note_wire(WordTag<Range>, int wire) {
     if (wire >= 0) Range::used |= std::uint64_t{1} << wire;

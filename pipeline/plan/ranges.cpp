@@ -102,4 +102,13 @@ void choose_words(Plan& plan) {
     leave_out_proven_limits(plan, ledger.last);
 }
 
+std::map<int, Range> proven_ranges(const Plan& plan) {
+    std::map<int, Range> ranges;
+    Range::of_wires = &ranges;
+    Silent observer;
+    any_slab<Range>(plan, observer);
+    Range::of_wires = nullptr;
+    return ranges;
+}
+
 }  // namespace squint

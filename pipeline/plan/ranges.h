@@ -3,6 +3,10 @@
 
 #include "pipeline/plan/plan.h"
 
+#include "fixedpoint/words/range.h"
+
+#include <map>
+
 namespace squint {
 
 /// Sets the needs of every stage, the golden model's word, the wires in use, and which of them need no limits
@@ -12,5 +16,9 @@ void choose_words(Plan& plan);
 
 /// The number of slabs of the longest ray through the rendered box, not rounded to an integer.
 double most_steps(const Plan& plan);
+
+/// The values that can reach each wire, rounded, in raw units, before its format limits them: proven by
+/// intervals over any slab of any ray, so often wider than what rays meet.  Wires of tables are left out.
+std::map<int, Range> proven_ranges(const Plan& plan);
 
 }  // namespace squint
