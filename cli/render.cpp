@@ -5,6 +5,7 @@
 #include "core/error.h"
 #include "core/preview.h"
 #include "core/text.h"
+#include "pipeline/audit_record.h"
 #include "pipeline/machines/certificate.h"
 #include "pipeline/plan_record.h"
 #include "pipeline/record.h"
@@ -121,22 +122,24 @@ std::string magnitudes(const WireStatistics& s, const Format& format) {
 }
 
 std::string audit_text(const Plan& plan, const RenderStatistics& statistics) {
-    std::vector<std::vector<std::string>> rows{
-        {"wire", "format", "count", "min", "max", "inexact", "to zero", "saturated", "wrapped", "bits"}};
-    for (std::size_t w = 0; w < statistics.wires.size(); ++w) {
-        const WireStatistics& s = statistics.wires[w];
-        const Format& format = plan.specs.spec[w].format;
-        if (s.count > 0)
-            rows.push_back({std::string(kWireInfo[w].name), to_string(format), std::to_string(s.count),
-                            fmt::format("{:.6g}", to_real(s.smallest, format)),
-                            fmt::format("{:.6g}", to_real(s.largest, format)), share(s.inexact, s.count),
-                            share(s.underflowed, s.count), share(s.saturated, s.count),
-                            share(s.wrapped, s.count), magnitudes(s, format)});
-    }
+    std::vector<std::vector<std::string>> rows{{"wire", "format", "count", "min", "max", "inexact", "to zero",
+                                                "saturated", "wrapped", "idle", "bits"}};
+    const auto add = [&](std::string_view name, const WireStatistics& s, const Format& format) {
+        rows.push_back({std::string(name), to_string(format), std::to_string(s.count),
+                        fmt::format("{:.6g}", to_real(s.smallest, format)),
+                        fmt::format("{:.6g}", to_real(s.largest, format)), share(s.inexact, s.count),
+                        share(s.underflowed, s.count), share(s.saturated, s.count), share(s.wrapped, s.count),
+                        fmt::format("{}+{}", unused_high_bits(s, format), zero_low_bits(s, format)),
+                        magnitudes(s, format)});
+    };
+    add("voxels", voxel_statistics(*plan.volume), voxel_format(*plan.volume));
+    for (std::size_t w = 0; w < statistics.wires.size(); ++w)
+        if (statistics.wires[w].count > 0)
+            add(kWireInfo[w].name, statistics.wires[w], plan.specs.spec[w].format);
     return table_text(rows) +
+           "idle: bits at the top that no value needed, and at the bottom that no value set\n"
            "bits: one place for each number of bits a value needs, from none to all of its format's; a digit "
-           "d "
-           "means 10^d values or more\n";
+           "d means 10^d values or more\n";
 }
 
 std::string text_of_error(const Comparison& comparison) {

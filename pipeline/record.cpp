@@ -1,6 +1,7 @@
 #include "pipeline/record.h"
 
 #include "core/hash.h"
+#include "pipeline/audit_record.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -256,31 +257,6 @@ Json json_of_wires(const Plan& plan) {
                                               {"rounding", to_string(spec.rounding)},
                                               {"overflow", to_string(spec.overflow)},
                                               {"width", spec.format.width()}};
-    }
-    return json;
-}
-
-Json json_of_audit(const Plan& plan, const RenderStatistics& statistics) {
-    Json json = Json::object();
-    for (std::size_t w = 0; w < statistics.wires.size(); ++w) {
-        const WireStatistics& s = statistics.wires[w];
-        if (s.count == 0) continue;
-        const Format& format = plan.specs.spec[w].format;
-        std::size_t bits = s.magnitude.size();
-        while (bits > 1 && s.magnitude[bits - 1] == 0) --bits;
-        Json magnitude = Json::array();
-        for (std::size_t b = 0; b < bits; ++b) magnitude.push_back(s.magnitude[b]);
-        json[std::string(kWireInfo[w].name)] = {{"format", to_string(format)},
-                                                {"count", s.count},
-                                                {"min_raw", s.smallest},
-                                                {"max_raw", s.largest},
-                                                {"min", to_real(s.smallest, format)},
-                                                {"max", to_real(s.largest, format)},
-                                                {"inexact", s.inexact},
-                                                {"underflowed", s.underflowed},
-                                                {"saturated", s.saturated},
-                                                {"wrapped", s.wrapped},
-                                                {"magnitude_bits", magnitude}};
     }
     return json;
 }

@@ -71,7 +71,6 @@ nlohmann::ordered_json json_of(const Volume& volume);
 nlohmann::ordered_json json_of_scene(const Scene& scene);
 nlohmann::ordered_json json_of_wires(const Plan& plan);
 nlohmann::ordered_json json_of(const RefinedSlabs& refined);
-nlohmann::ordered_json json_of_audit(const Plan& plan, const RenderStatistics& statistics);
 /// A picture: time, samples, rays, path, target, memory, hash and, where asked for, audit and errors.
 nlohmann::ordered_json json_of(const Plan& plan, const Rendering& rendering, const Errors* errors,
                                bool audit);

@@ -5,6 +5,7 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/module_file.h"
+#include "pipeline/audit_record.h"
 #include "pipeline/machines/lanes/empty_space.h"
 #include "pipeline/machines/model.h"
 #include "pipeline/record.h"

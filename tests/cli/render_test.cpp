@@ -187,19 +187,22 @@ TEST_F(Render, TheAuditsTableSaysWhatItsRecordSays) {
     std::string line;
     std::getline(table, line);
     std::size_t wires = 0;
-    while (std::getline(table, line) && !line.starts_with("bits:")) {
+    while (std::getline(table, line) && !line.starts_with("idle:")) {
         std::istringstream cells(line);
-        std::string wire, format, bits;
+        std::string wire, format, idle, bits;
         std::int64_t count = 0;
         double least = 0, greatest = 0;
         cells >> wire >> format >> count >> least >> greatest;
-        for (std::string word; cells >> word;) bits = word;
+        for (std::string word; cells >> word;) idle = std::exchange(bits, word);
         ASSERT_TRUE(record.contains(wire)) << wire;
         const auto& of = record[wire];
         EXPECT_EQ(of["format"], format);
         EXPECT_EQ(of["count"], count) << wire;
         EXPECT_NEAR(of["min"].get<double>(), least, 1e-5 * std::abs(least)) << wire;
         EXPECT_NEAR(of["max"].get<double>(), greatest, 1e-5 * std::abs(greatest)) << wire;
+        EXPECT_EQ(idle, std::to_string(of["unused_high_bits"].get<int>()) + "+" +
+                            std::to_string(of["zero_low_bits"].get<int>()))
+            << wire;
         // A digit for each number of bits that some value needs: the power of ten of how many do.
         const std::vector<std::int64_t> magnitude = of["magnitude_bits"];
         ASSERT_GE(bits.size(), magnitude.size()) << wire;
@@ -212,6 +215,39 @@ TEST_F(Render, TheAuditsTableSaysWhatItsRecordSays) {
     }
     EXPECT_EQ(wires, record.size());
     EXPECT_GT(wires, 20u);
+}
+
+// Along an axis every step is one voxel: along it weights have one value, and the step one bit.
+TEST_F(Render, TheAuditCountsBitsThatNoValueNeedsOrSets) {
+    const auto audit =
+        squint("render" + kSmall +
+               "--set camera.azimuth=0 --set camera.elevation=0 --set lights=[] --audit -q --json -")
+            .json()["pictures"][0]["audit"];
+    EXPECT_EQ(audit["direction"]["zero_low_bits"], 24) << "one voxel a step";
+    EXPECT_EQ(audit["direction"]["unused_high_bits"], 0);
+    EXPECT_EQ(audit["voxels"]["count"], 16 * 16 * 16);
+    EXPECT_EQ(audit["voxels"]["format"], "u12.0");
+    EXPECT_EQ(audit["sample"]["inexact"], 0);
+}
+
+// Intervals hold for every ray: no value that an audit met lies outside them.
+TEST_F(Render, NoWireCarriesWhatIntervalsRuleOut) {
+    int proven = 0;
+    for (const char* method : {"pc", "pips", "leg", "pi1d", "pi2d"})
+        for (const char* rest :
+             {"", "--set lights=[]", "--set camera.projection=perspective --set compositing.form=alpha",
+              "--set precision.preset=squeeze --set sampling.step=0.6"}) {
+            const auto audit = squint("render" + kSmall + "--audit -q --json - " + rest +
+                                      " --set classification.method=" + method)
+                                   .json()["pictures"][0]["audit"];
+            for (const auto& [name, wire] : audit.items()) {
+                if (!wire.contains("proven_max")) continue;
+                ++proven;
+                EXPECT_LE(wire["proven_min"], wire["min"]) << method << ' ' << rest << ' ' << name;
+                EXPECT_GE(wire["proven_max"], wire["max"]) << method << ' ' << rest << ' ' << name;
+            }
+        }
+    EXPECT_GT(proven, 250);
 }
 
 TEST_F(Render, WhatIsAskedForDecidesWhatIsWritten) {
