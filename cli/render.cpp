@@ -10,6 +10,8 @@
 #include "pipeline/plan_record.h"
 #include "pipeline/record.h"
 #include "scene/presets.h"
+#include "studies/sweep/profile.h"
+#include "studies/sweep/report.h"
 #include "truth/reference.h"
 
 #include <fmt/format.h>
@@ -36,6 +38,7 @@ struct RenderArguments {
     SceneArguments scene;
     std::string output, preview, json;  // json: a file, or - for standard output
     std::string reference_output;       // the reference picture, as EXR
+    std::string profile, command;       // the page of --profile, and what asked for it
     RenderOptions options;
     std::int64_t max_memory = 0;  // bytes; 0: no limit
     bool reference = false, error = false, bound = false, quiet = false, scene_reference = false,
@@ -76,7 +79,7 @@ std::string frame_path(const std::string& path, int frame, int frames) {
 
 using Extensions = std::span<const std::string_view>;
 constexpr std::string_view kExr[] = {".exr"}, kPreviews[] = {".png", ".jpg", ".jpeg"},
-                           kPictures[] = {".exr", ".png", ".jpg", ".jpeg"};
+                           kPictures[] = {".exr", ".png", ".jpg", ".jpeg"}, kPages[] = {".html"};
 
 bool ends_in(const std::string& path, Extensions extensions) {
     const std::string extension = std::filesystem::path(path).extension().string();
@@ -225,11 +228,13 @@ Json render_frame(const Job& job, int frame) {
     std::optional<ProgressBar> bar(std::in_place, !a.quiet);
     RenderOptions options = a.options;
     options.cancelled = &interrupted;
+    options.audit = a.options.audit || !a.profile.empty();
     if (a.max_memory > 0) options.layout_bytes = a.max_memory - needed;
     options.progress = [&](double part) { (*bar)(part); };
     Rendering rendering;
     Errors errors;
     Certificate certificate;
+    std::string page;
     {
         const Interruptible here;
         rendering = render(plan, options);
@@ -239,10 +244,15 @@ Json render_frame(const Job& job, int frame) {
             if (!a.quiet) say(price_of_errors(plan, rendering.statistics));
             errors = rounding_errors(plan, rendering.image, options, frame);
         }
-        if (a.bound)
-            certificate = certify(
-                plan,
-                {.threads = options.threads, .channels = !job.output.empty(), .cancelled = &interrupted});
+        const auto obstacle = a.profile.empty() ? std::nullopt : what_is_not_bounded(plan);
+        if (a.bound || (!a.profile.empty() && !obstacle))
+            certificate = certify(plan, {.threads = options.threads,
+                                         .channels = a.bound && !job.output.empty(),
+                                         .cancelled = &interrupted});
+        if (!a.profile.empty()) {
+            const sweep::Proof proof = obstacle ? sweep::Proof(*obstacle) : sweep::Proof(certificate);
+            page = sweep::report_html(sweep::profile_data(plan, rendering, proof, a.command), "");
+        }
         if (a.reference || !a.reference_output.empty()) {
             ProgressBar second(!a.quiet);
             ReferenceOptions exact{.threads = options.threads, .cancelled = &interrupted};
@@ -265,6 +275,7 @@ Json render_frame(const Job& job, int frame) {
         const double background[3] = {b.x, b.y, b.z};
         write_preview(rendering.image, png, background);
     }
+    if (!page.empty()) write_text_whole(frame_path(a.profile, frame, frames), page);
     const bool measured = a.error || a.reference;
     std::vector<std::string> warnings = warnings_of(plan, rendering);
     warnings.insert(warnings.begin(), job.warnings.begin(), job.warnings.end());
@@ -285,7 +296,7 @@ Json render_frame(const Job& job, int frame) {
         if (measured) say(error_text(errors));
         if (a.bound) say(bound_text(certificate));
     }
-    if (a.options.audit && a.json != "-") print(audit_text(plan, rendering.statistics));
+    if (a.options.audit && a.json != "-" && a.profile.empty()) print(audit_text(plan, rendering.statistics));
     Json record = json_of(plan, rendering, measured ? &errors : nullptr, a.options.audit);
     if (a.bound) record["bound"] = json_of(certificate);
     record["frame"] = frame;
@@ -305,7 +316,7 @@ std::string film_line(const Job& job) {
 }
 
 std::string default_output(const RenderArguments& a) {
-    if (!a.preview.empty() || !a.json.empty() || a.options.audit) return {};
+    if (!a.preview.empty() || !a.json.empty() || a.options.audit || !a.profile.empty()) return {};
     return a.scene.file.empty() ? "squint.exr" : std::filesystem::path(a.scene.file).stem().string() + ".exr";
 }
 
@@ -315,6 +326,9 @@ int run(const RenderArguments& a) {
     check_output(output, "-o", kPictures);
     check_output(preview, "--preview", kPreviews);
     check_output(a.reference_output, "--reference-output", kExr);
+    check_output(a.profile, "--profile", kPages);
+    if (!a.profile.empty())
+        if (const std::string why = sweep::why_no_page(); !why.empty()) throw InputError("--profile: " + why);
     if (a.json != "-") check_output(a.json, "--json", {});
     if (ends_in(output, kPreviews)) {
         if (!preview.empty())
@@ -329,9 +343,10 @@ int run(const RenderArguments& a) {
         load_and_complete(a.scene, scene, unread, warnings, a.max_memory);
         return print(to_toml(scene)), kDone;
     }
-    if (a.options.audit && rounds_nothing(scene.precision.preset))
+    const bool audited = a.options.audit || !a.profile.empty();
+    if (audited && rounds_nothing(scene.precision.preset))
         throw InputError(fmt::format(
-            "--audit: precision.preset is \"{}\", which rounds no wire; allowed: any other preset",
+            "--audit, --profile: precision.preset is \"{}\", which rounds no wire; allowed: any other preset",
             scene.precision.preset));
     refuse_beyond(a.max_memory, image_bytes(scene),
                   fmt::format("a picture of {}x{} pixels", scene.image.width, scene.image.height));
@@ -385,6 +400,11 @@ void flags(Flags& f, RenderArguments& a) {
     f.add("--reference-output", a.reference_output, "Write that integral's picture as EXR").value("OUT.exr");
     f.add("--audit", a.options.audit,
           "Count what every wire carried: least, greatest, inexact, underflowed to zero, saturated, wrapped");
+    f.add("--profile", a.profile,
+          "Write a page: what every wire carried and can carry, its share of the bound, and the format that "
+          "would be enough (docs/guarantees.md)")
+        .value("PAGE.html");
+    a.command = f.command();
     f.add("--threads", a.options.threads, "Threads; default: one a processor").between(1, 4096).value("N");
     f.add("--tile", a.options.tile, "Pixels on a side of a thread's piece of work")
         .between(1, 65536)

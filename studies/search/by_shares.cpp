@@ -20,9 +20,16 @@ int bits_for_ratio(double x) {
     return part > 0.5 ? exponent : exponent - 1;
 }
 
-int least_of(const Pictures& pictures, Wire wire) {
-    const auto found = pictures.least.find(wire);
-    return found == pictures.least.end() ? 1 : found->second;
+int least_of(const std::map<Wire, int>& least, Wire wire) {
+    const auto found = least.find(wire);
+    return found == least.end() ? 1 : found->second;
+}
+
+/// What no wire's bits can take away.
+double fixed_part(const Shares& greatest) {
+    double sum = greatest[Shares::kElsewhere];
+    for (int p = kWires; p < kPayers; ++p) sum += greatest[p];
+    return sum;
 }
 
 }  // namespace
@@ -33,10 +40,19 @@ std::map<Wire, int> least_bits(const Plan& plan) {
     return {};
 }
 
-double Proof::fixed() const {
-    double sum = greatest[Shares::kElsewhere];
-    for (int p = kWires; p < kPayers; ++p) sum += greatest[p];
-    return sum;
+Bits equal_shares(const Shares& greatest, const Bits& bits, const std::map<Wire, int>& least,
+                  double most_error) {
+    const auto share = [&](Wire wire) { return greatest[static_cast<int>(wire)]; };
+    // Walls, rows and termination need not meet in one pixel.
+    const double left = std::max(most_error - fixed_part(greatest), most_error / 8);
+    int payers = 0;
+    for (const auto& item : bits) payers += share(item.first) > 0;
+    Bits wanted = bits;
+    for (auto& [wire, fraction] : wanted)
+        if (share(wire) > 0)
+            fraction = std::clamp(fraction + bits_for_ratio(payers * share(wire) / left),
+                                  least_of(least, wire), kMostChosenFractionBits);
+    return wanted;
 }
 
 int Proof::binding() const {
@@ -64,18 +80,9 @@ Proof prove(const Pictures& pictures, const Bits& bits) {
 bool reach(const Pictures& pictures, double most_error, int raises, Bits& bits, Proof& proof) {
     proof = prove(pictures, bits);
     for (int round = 0; round < kRounds; ++round) {
-        // Walls, rows and termination need not meet in one pixel.
-        const double left = std::max(most_error - proof.fixed(), most_error / 8);
-        int payers = 0;
-        for (const auto& item : bits) payers += proof.share(item.first) > 0;
-        bool changed = false;
-        for (auto& [wire, fraction] : bits) {
-            if (!(proof.share(wire) > 0)) continue;
-            const int more = bits_for_ratio(payers * proof.share(wire) / left);
-            const int wanted = std::clamp(fraction + more, least_of(pictures, wire), kMostChosenFractionBits);
-            changed = changed || wanted != fraction, fraction = wanted;
-        }
-        if (!changed) break;
+        const Bits wanted = equal_shares(proof.greatest, bits, pictures.least, most_error);
+        if (wanted == bits) break;
+        bits = wanted;
         proof = prove(pictures, bits);
         if (proof.most <= most_error) return true;
     }
@@ -102,7 +109,7 @@ void take_back(const Pictures& pictures, double most_error, int rounds, Bits& bi
         };
         std::vector<Candidate> candidates;
         for (const auto& [wire, fraction] : bits) {
-            if (fraction <= least_of(pictures, wire) || refused.contains(wire)) continue;
+            if (fraction <= least_of(pictures.least, wire) || refused.contains(wire)) continue;
             Bits fewer = bits;
             --fewer[wire];
             try {

@@ -30,8 +30,6 @@ struct Proof {
     std::int64_t rays = 0, undecided = 0;
 
     double share(Wire wire) const { return greatest[static_cast<int>(wire)]; }
-    /// What no wire's bits can take away.
-    double fixed() const;
     /// Who pays most in the pixel with the greatest bound.
     int binding() const;
 };
@@ -46,6 +44,11 @@ struct Pictures {
     CertificateOptions certificate;
     std::function<void(const Proof&)> proven;  // hears every proof; may be empty
 };
+
+/// The fraction bits above, of wires that have `bits` and pay `greatest`, for a bound of `most_error` LSB8.  A wire
+/// that pays nothing keeps its own.
+Bits equal_shares(const Shares& greatest, const Bits& bits, const std::map<Wire, int>& least,
+                  double most_error);
 
 /// What a plan's certificates ask of formats.
 std::map<Wire, int> least_bits(const Plan& plan);

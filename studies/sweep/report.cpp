@@ -105,17 +105,7 @@ Json point_of(const Json& record) {
     p["color_above_alpha"] = record["color_above_alpha_lsb8"];
     for (const char* name : {"conservation", "stuck", "warnings"})
         if (record.contains(name)) p[name] = record[name];
-    if (record.contains("audit"))
-        for (const auto& [wire, a] : record["audit"].items())
-            p["audit"][wire] = {{"format", a["format"]},
-                                {"count", a["count"]},
-                                {"min", a["min"]},
-                                {"max", a["max"]},
-                                {"inexact", a["inexact"]},
-                                {"saturated", a["saturated"]},
-                                {"wrapped", a["wrapped"]},
-                                {"underflowed", a.value("underflowed", std::int64_t{0})},
-                                {"bits", a["magnitude_bits"]}};
+    if (record.contains("audit")) p["audit"] = record["audit"];
     return p;
 }
 
@@ -349,6 +339,12 @@ std::vector<Column> columns_of(const Json& data) {
 
 }  // namespace
 
+Json wires_by_stage() {
+    Json stages = Json::object();
+    for (const WireInfo& wire : kWireInfo) stages[std::string(wire.stage)].push_back(wire.name);
+    return stages;
+}
+
 Json report_data(const std::string& run, double most_error) {
     const Json sweep = read_json(run + "/sweep.json");
     if (sweep.value("schema", "") != "squint.sweep/1")
@@ -360,6 +356,7 @@ Json report_data(const std::string& run, double most_error) {
               {"text", sweep["text"]},
               {"mode", sweep["mode"]},
               {"axes", sweep["axes"]},
+              {"stages", wires_by_stage()},
               {"measured", sweep["measured"]}};
     if (sweep.contains("search")) data["search"] = sweep["search"];
     Json points = Json::array(), entries = Json::array();
@@ -473,7 +470,7 @@ std::string report_html(const Json& data, const std::string& run, std::int64_t m
     const std::set<std::size_t> front = pareto_front(data);
     Pictures pictures(most_picture_bytes);
     const Json& points = data["points"];
-    for (std::size_t i = 0; i < points.size(); ++i) {
+    for (std::size_t i = 0; i < points.size() && !run.empty(); ++i) {
         const std::string hash = points[i]["hash"];
         pictures.add(hash, run + "/pictures/" + hash + ".values", i == 0 || front.contains(i));
         if (points[i].contains("baselines"))

@@ -15,12 +15,15 @@ inline constexpr double kHalfLsb8 = 0.5;
 /// within `most_error` LSB8 or a search's own bound.  Throws InputError when `run` is no run.
 Json report_data(const std::string& run, double most_error = kHalfLsb8);
 
+/// The wires in their order, by stage; data["stages"].
+Json wires_by_stage();
+
 /// A line a point: its axes, then its figures.
 std::string report_csv(const Json& data);
 std::string report_markdown(const Json& data);
 
 /// The page.  Pictures take at most `most_picture_bytes`: baselines and points of the Pareto front first, in
-/// full; the others in full or coarser, as room allows.
+/// full; the others in full or coarser, as room allows.  No `run`: no pictures.
 std::string report_html(const Json& data, const std::string& run, std::int64_t most_picture_bytes = 24 << 20);
 
 /// A line that says why this build has no page; empty where it has one.

@@ -250,6 +250,17 @@ TEST_F(Render, NoWireCarriesWhatIntervalsRuleOut) {
     EXPECT_GT(proven, 250);
 }
 
+TEST_F(Render, AProfileIsAPageAndRefusesWhatRoundsNothing) {
+    const Outcome r = squint("render" + kSmall + "--set lights=[] --profile wires.html");
+    EXPECT_EQ(r.code, 0) << r.err;
+    EXPECT_EQ(r.out, "");
+    EXPECT_THAT(files(), ElementsAre("wires.html"));
+    EXPECT_THAT(contents(folder / "wires.html"), HasSubstr("Profile of the built-in scene"));
+    expect_refusal(squint("render" + kSmall + "--profile wires.txt"), "the name must end in .html");
+    expect_refusal(squint("render" + kSmall + "--set precision.preset=real --profile wires.html"),
+                   "which rounds no wire");
+}
+
 TEST_F(Render, WhatIsAskedForDecidesWhatIsWritten) {
     const auto written = [&](const std::string& flags) {
         for (const std::string& name : files()) fs::remove(folder / name);

@@ -73,6 +73,27 @@ for (const width of [1280, 800]) {
   });
 }
 
+test('a profile shows the wires of one picture, and nothing of sweeps', async () => {
+  const file = join(is.folder, 'profile.html');
+  is.squint('render', '--size', '48x48', '--set', 'volume.dims=24', '--set', 'lights=[]', '--profile', file, '-q');
+  for (const width of [1280, 800]) {
+    const page = await is.open(browser, file, width);
+    await is.seeAll(page);
+    assert.deepEqual(page.said, []);
+    assert.deepEqual(await is.overlaps(page), []);
+    assert.equal(await page.isVisible('#pareto'), false);
+    assert.notEqual(await is.shown(page, '#range-chart canvas'), null);
+    assert.match(await page.textContent('#answer'), /proven/);
+    const head = await page.$$eval('#range-table th', (all) => all.map((cell) => cell.textContent));
+    assert.deepEqual(head.slice(0, 2), ['wire', 'format']);
+    assert.equal(head.at(-1), 'enough');
+    const wires = await page.$$eval('#range-table tbody tr', (all) => all.map((line) => line.cells[0].textContent));
+    assert.equal(wires[0], 'voxels');
+    assert.ok(wires.includes('transparency') && wires.length > 12, wires.join(' '));
+    await page.close();
+  }
+});
+
 test('the page is the one that its parts make', () => {
   const parts = join(is.parts, 'page'), page = readFileSync(join(is.parts, 'report.html'), 'utf8');
   for (const file of readdirSync(parts).filter((name) => /\.(js|css)$/.test(name))) assert.ok(page.includes(readFileSync(join(parts, file), 'utf8')), `${file} changed: run tools/report/bundle`);

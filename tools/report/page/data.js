@@ -10,16 +10,8 @@ const kCosts = { bits: 'bits (words + operations)', word_bits: 'bits of words', 
 // LSB8: what was asked for, or what rounding to 8 bits may cost anyway.
 const bound = () => data.answer.bound;
 const boundName = () => bound() === 0.5 ? 'half an LSB8' : `${number(bound())} LSB8`;
-const kStages = ['sample location', 'interpolation', 'gradient', 'classification', 'shading', 'compositing'];
-const kStageOf = {
-  location: 0, direction: 0, weight: 0, length: 0,
-  lerp_x: 1, lerp_y: 1, sample: 1,
-  gradient_lerp: 2, gradient: 2, spacing: 2, normal: 2,
-  classification_input: 3, table_color: 3, table_alpha: 3, table_extinction: 3, table_moment: 3, slab_depth: 3, slab_ratio: 3, slab_alpha: 3, slab_color: 3,
-  light: 4, dot: 4, power: 4, material: 4, intensity: 4, lit_color: 4,
-  contribution: 5, color: 5, transparency: 5,
-};
-const kWires = Object.keys(kStageOf);
+const stageNames = () => Object.keys(data.stages), wireNames = () => Object.values(data.stages).flat();
+const stageOfWire = (wire) => stageNames().find((stage) => data.stages[stage].includes(wire));
 
 async function inflated(bytes) {
   return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate'))).arrayBuffer();

@@ -5,7 +5,7 @@ function about() {
   $('answer').classList.toggle('bad', !data.answer.good);
   $('note').textContent = data.note;
   const failed = points.filter((p) => !done(p)).length;
-  $('facts').textContent = `${entries.length} points, ${points.length} of them different${failed ? `, ${failed} failed` : ''}; squint ${data.version}. Errors in LSB8, 1/255 of full scale in linear light, over the foreground.`;
+  $('facts').textContent = data.facts ?? `${entries.length} points, ${points.length} of them different${failed ? `, ${failed} failed` : ''}; squint ${data.version}. Errors in LSB8, 1/255 of full scale in linear light, over the foreground.`;
   $('not-measured').replaceChildren(...data.not_measured.map((line) => element('li', {}, line)));
   $('text').textContent = data.text;
   const names = ['started', 'CPU', 'processors', 'shard', 'computed', 'failed', 'seconds', 'squint', 'build', 'command'];
@@ -53,9 +53,21 @@ function startControls() {
   });
 }
 
+// One picture's profile: its wires, and how it was made.
+async function startProfile() {
+  for (const id of ['search', 'pareto', 'pictures', 'sensitivity', 'heat', 'table']) $(id).hidden = true;
+  document.querySelector('nav.controls').hidden = true;
+  $('text-name').textContent = 'The scene';
+  points[0].label = 'this picture';
+  await ranges();
+  document.documentElement.dataset.ready = 'yes';
+}
+
 async function start() {
   await readData();
-  about(), search();
+  about();
+  if (data.mode === 'profile') return startProfile();
+  search();
   findAxes(), startSensitivity(), startHeat(), startPictures(), startTable(), startControls();
   if (!points.some((p) => p.audit)) $('ranges').hidden = true;
   draw();

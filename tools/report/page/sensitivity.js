@@ -72,7 +72,7 @@ function axisCurves() {
 
 // Of a wire, or of several varied as one; undefined where they are of different stages.
 function stageOf(wires) {
-  const stages = new Set(wires.split(' + ').map((wire) => kStages[kStageOf[wire]]));
+  const stages = new Set(wires.split(' + ').map(stageOfWire));
   return stages.size === 1 ? [...stages][0] : undefined;
 }
 // wire -> its points by number of bits, the base point among them.
@@ -112,7 +112,7 @@ function wireCurves() {
     return list.map((r) => ({ wire, at: r.at, error: shown(r), hash: r.p.hash, base: r.base, first: r === first,
       tip: { wire, format: r.p.wires?.[wire] ?? '', [kFigures[state.figure]]: number(errorOf(r.p)), ...(r === first ? { '': `the first within ${boundName()}` } : {}) } }));
   });
-  const stages = ['all wires together', ...kStages].filter((s) => panels.has(s));
+  const stages = ['all wires together', ...stageNames()].filter((s) => panels.has(s));
   for (const child of [...place.children]) if (!stages.includes(child.dataset.stage)) clearChart(child), child.remove();
   stages.forEach((stage, i) => {
     let panel = [...place.children].find((c) => c.dataset.stage === stage);
@@ -124,7 +124,7 @@ function wireCurves() {
 function wirePanel(panel, stage, values, domain, ends, title) {
   const y = { field: 'error', ...errorAxis(domain) };
   const x = { field: 'at', type: 'quantitative', title, scale: { domain: ends, nice: false, padding: 8 }, axis: { tickMinStep: 1, format: 'd' } };
-  const wires = [...new Set(values.map((v) => v.wire))].sort((a, b) => kWires.indexOf(a.split(' + ')[0]) - kWires.indexOf(b.split(' + ')[0]));
+  const names = wireNames(), wires = [...new Set(values.map((v) => v.wire))].sort((a, b) => names.indexOf(a.split(' + ')[0]) - names.indexOf(b.split(' + ')[0]));
   const scale = { domain: wires, range: kPalette }, longest = Math.max(...wires.map((wire) => wire.length));
   const columns = longest > 30 ? 1 : longest > 18 ? 2 : 3, labelLimit = (panel.clientWidth - 60) / columns - 20;
   const color = { field: 'wire', type: 'nominal', title: null, scale, legend: { orient: 'bottom', columns, labelLimit, symbolType: 'stroke', symbolStrokeWidth: 3 } };
