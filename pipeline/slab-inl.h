@@ -147,20 +147,159 @@ Accumulated<W> projected(const Plan& plan, const M& method, const ProjectedRay<W
     return pixel;
 }
 
+/// What a place on a ray has: a scalar, a gradient, light.  Stages 1, 2, 3 and 5, which know no method of
+/// classification.
+template <class W, class Voxels, class Observer = const Silent>
+class Places {
+  public:
+    Places(const Plan& plan, const Voxels& voxels, const RayWords<W>& ray, Observer& observer)
+        : plan_(plan), voxels_(voxels), ray_(ray), observer_(observer) {}
+
+    /// Stages 1 and 2: sample k of the ray.
+    Sample<W> sample(W k) const {
+        observer_.at(Part::location);
+        return sample_at({locate(plan_.location, ray_, k, 0), locate(plan_.location, ray_, k, 1),
+                          locate(plan_.location, ray_, k, 2)});
+    }
+
+    /// Stage 3: the raw gradient at a sample, which two slabs share; computed once.
+    const std::array<W, 3>& gradient_of(Sample<W>& sample) const {
+        if (!sample.has_gradient) sample.gradient = gradient_at(sample), sample.has_gradient = true;
+        return sample.gradient;
+    }
+
+  protected:
+    // The raw gradient at `part` 2^-bits of the way from one sample to the other.
+    std::array<W, 3> gradient_between(const Sample<W>& front, const Sample<W>& back, int part,
+                                      int bits) const {
+        observer_.at(Part::location);
+        Sample<W> sample;
+        sample.location = location_between(plan_.inside, front.location, back.location, part, bits);
+        sample.position = position_of(sample.location);
+        return gradient_at(sample);
+    }
+    // Stages 1 and 2 there.
+    Sample<W> sample_between(const Sample<W>& front, const Sample<W>& back, int part, int bits) const {
+        observer_.at(Part::location);
+        return sample_at(location_between(plan_.inside, front.location, back.location, part, bits));
+    }
+
+    // Stage 2 at a location.
+    Sample<W> sample_at(const std::array<W, 3>& location) const {
+        Sample<W> sample = scalar_at(location);
+        observer_.at(Part::input);
+        sample.input = classification_input(plan_.input, sample.scalar);
+        return sample;
+    }
+    Sample<W> scalar_at(const std::array<W, 3>& location) const {
+        Sample<W> sample;
+        sample.location = location;
+        sample.position = position_of(location);
+        observer_.at(Part::interpolation);
+        sample.scalar =
+            interpolate(plan_.interpolation, voxels_.cell(sample.position.cell), sample.position.weight);
+        return sample;
+    }
+
+    CellPosition<W> position_of(const std::array<W, 3>& location) const {
+        CellPosition<W> position = cell_position(plan_.location, location);
+        // A place inside a cell is at most 1: intervals cannot see that.
+        for (W& w : position.weight) w = within(w, 0, std::int64_t{1} << plan_.interpolation.weight_bits);
+        return position;
+    }
+
+    // Stage 3 at a sample: the raw gradient, per smallest voxel spacing.
+    std::array<W, 3> gradient_at(const Sample<W>& sample) const {
+        const GradientStage& s = plan_.gradient;
+        std::array<W, 3> gradient;
+        Neighbourhood<W> near;
+        if (s.rule != GradientRule::central_samples) near = voxels_.neighbourhood(sample.position.cell);
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto a = static_cast<std::size_t>(axis);
+            W component;
+            if (s.rule == GradientRule::central_samples) {
+                const W ahead = scalar_beside(sample, axis, true),
+                        behind = scalar_beside(sample, axis, false);
+                observer_.at(Part::gradient);
+                component = sample_difference(s, ahead, behind);
+            } else {
+                observer_.at(Part::gradient);
+                component = voxel_difference(s, near, sample.position.weight, axis);
+            }
+            gradient[a] = to_world(s, component, axis);
+        }
+        if (!s.exaggerated.wanted) return gradient;
+        observer_.at(Part::gradient);
+        return exaggerated_gradient(plan_, voxels_, sample.position.cell, sample.position.weight, gradient);
+    }
+    W scalar_beside(const Sample<W>& sample, int axis, bool ahead) const {
+        observer_.at(Part::location);
+        std::array<W, 3> location = sample.location;
+        const auto a = static_cast<std::size_t>(axis);
+        location[a] = beside(plan_.location, location[a], axis, ahead);
+        return scalar_at(location).scalar;
+    }
+
+    // Lights a slab or a piece of one by one raw gradient; a slab's normal is that of its first piece.
+    void light_with(const std::array<W, 3>& gradient, Slab<W>& slab, bool is_first = true) const {
+        observer_.at(Part::normal);
+        const std::array<W, 3> normal = normalise(plan_.gradient, gradient);
+        const W certain = plan_.gradient.fades ? confidence(plan_.gradient, gradient) : constant<W>(0);
+        if (is_first) observer_.lit(normal);
+        observer_.at(Part::shading);
+        shade(plan_.shading, ray_, normal, slab.alpha, slab.color, certain);
+    }
+    // Lights a slab by the gradients at one or two places between its ends.
+    void light_places(const std::array<W, 3>& at_front, const std::array<W, 3>& at_back,
+                      const LightPlaces<W>& places, Slab<W>& slab) const {
+        const auto gradient_there = [&](W way) {
+            observer_.at(Part::gradient);
+            return gradient_up_to(plan_.inside, at_front, at_back, way);
+        };
+        Slab<W> far = slab;
+        light_with(gradient_there(places.near), slab);
+        if (plan_.inside.rule == InsideRule::centroid) return;
+        light_with(gradient_there(places.far), far, false);
+        observer_.at(Part::shading);
+        slab.color = light_of_places(plan_.inside, slab.color, far.color, places.share);
+    }
+    // Lights a slab between two raw gradients, where its tables say where its light lies.
+    void light_fading(const std::array<W, 3>& at_front, const std::array<W, 3>& at_back,
+                      const FadingLight<W>& light, Slab<W>& slab) const {
+        observer_.at(Part::gradient);
+        const std::array<std::array<W, 3>, 2> gradient{
+            gradient_up_to(plan_.inside, at_front, at_back, constant<W>(0)),
+            gradient_up_to(plan_.inside, at_front, at_back, light.end)};
+        observer_.at(Part::normal);
+        const FadingNormals<W> ends = fading_normals(plan_.gradient, gradient);
+        observer_.lit(ends.normal[0]);
+        observer_.at(Part::shading);
+        shade_fading(plan_.shading, ray_, ends.normal, ends.certain, light, slab.color);
+    }
+
+    const Plan& plan_;
+    const Voxels& voxels_;
+    const RayWords<W>& ray_;
+    Observer& observer_;
+};
+
 /// Takes the slabs of one ray, one after the other, through all stages to its pixel.  `slabs`: their number.
 template <class W, class M, class Voxels, class Observer = const Silent>
-class Slabs {
+class Slabs : public Places<W, Voxels, Observer> {
+    using Places = HWY_NAMESPACE::Places<W, Voxels, Observer>;
+    using Places::gradient_of, Places::gradient_between, Places::sample_between, Places::position_of,
+        Places::light_with, Places::light_fading;
+    using Places::plan_, Places::voxels_, Places::ray_, Places::observer_;
+
   public:
+    using Places::sample;
     Accumulated<W> pixel;  // gathered so far
 
     Slabs(const Plan& plan, const M& method, const Voxels& voxels, const RayWords<W>& ray, W slabs,
           Observer& observer)
-        : pixel(nothing_yet<W>(plan.compositing)),
-          plan_(plan),
+        : Places(plan, voxels, ray, observer),
+          pixel(nothing_yet<W>(plan.compositing)),
           method_(method),
-          voxels_(voxels),
-          ray_(ray),
-          observer_(observer),
           last_(slabs - constant<W>(1)),
           backwards_(plan.compositing.form == CompositingForm::back_to_front) {}
 
@@ -178,16 +317,6 @@ class Slabs {
 
     /// Whether slabs behind this one can still be seen.
     auto goes_on() const { return HWY_NAMESPACE::goes_on(plan_.compositing, pixel); }
-
-    /// Stages 1 and 2: sample k of the ray.
-    Sample<W> sample(W k) const {
-        observer_.at(Part::location);
-        return sample_at({locate(plan_.location, ray_, k, 0), locate(plan_.location, ray_, k, 1),
-                          locate(plan_.location, ray_, k, 2)});
-    }
-
-    /// Stage 3: the raw gradient at a sample.
-    const std::array<W, 3>& gradient(Sample<W>& sample) const { return gradient_of(sample); }
 
     /// Ends a projection.
     void project(const ProjectedRay<W>& ray) { pixel = projected(plan_, method_, ray, pixel, observer_); }
@@ -290,34 +419,11 @@ class Slabs {
         else
             return fading_light_of_quarters(plan_.inside, method_, front, back, length, slab);
     }
-    // Lights a slab by the gradients at one or two places between its ends.
     void light_places(const std::array<W, 3>& at_front, const std::array<W, 3>& at_back, W front, W back,
                       W length, Slab<W>& slab) const {
         observer_.at(Part::classification);
-        const LightPlaces<W> places = places_of_light(plan_.inside, method_.prefix, front, back, length);
-        const auto gradient_there = [&](W way) {
-            observer_.at(Part::gradient);
-            return gradient_up_to(plan_.inside, at_front, at_back, way);
-        };
-        Slab<W> far = slab;
-        light_with(gradient_there(places.near), slab);
-        if (plan_.inside.rule == InsideRule::centroid) return;
-        light_with(gradient_there(places.far), far, false);
-        observer_.at(Part::shading);
-        slab.color = light_of_places(plan_.inside, slab.color, far.color, places.share);
-    }
-    // Lights a slab between two raw gradients, where its tables say where its light lies.
-    void light_fading(const std::array<W, 3>& at_front, const std::array<W, 3>& at_back,
-                      const FadingLight<W>& light, Slab<W>& slab) const {
-        observer_.at(Part::gradient);
-        const std::array<std::array<W, 3>, 2> gradient{
-            gradient_up_to(plan_.inside, at_front, at_back, constant<W>(0)),
-            gradient_up_to(plan_.inside, at_front, at_back, light.end)};
-        observer_.at(Part::normal);
-        const FadingNormals<W> ends = fading_normals(plan_.gradient, gradient);
-        observer_.lit(ends.normal[0]);
-        observer_.at(Part::shading);
-        shade_fading(plan_.shading, ray_, ends.normal, ends.certain, light, slab.color);
+        Places::light_places(at_front, at_back,
+                             places_of_light(plan_.inside, method_.prefix, front, back, length), slab);
     }
 
     // A slab from 2^bits pieces, lit if light falls on it; input_at(i): between pieces i - 1 and i.
@@ -349,97 +455,7 @@ class Slabs {
         return {color_of_pieces(inside, sum), opacity_of_pieces(inside, sum)};
     }
 
-    // Lights a slab or a piece of one by one raw gradient; a slab's normal is that of its first piece.
-    void light_with(const std::array<W, 3>& gradient, Slab<W>& slab, bool is_first = true) const {
-        observer_.at(Part::normal);
-        const std::array<W, 3> normal = normalise(plan_.gradient, gradient);
-        const W certain = plan_.gradient.fades ? confidence(plan_.gradient, gradient) : constant<W>(0);
-        if (is_first) observer_.lit(normal);
-        observer_.at(Part::shading);
-        shade(plan_.shading, ray_, normal, slab.alpha, slab.color, certain);
-    }
-
-    // The raw gradient at an end, which two slabs share; computed once.
-    const std::array<W, 3>& gradient_of(Sample<W>& sample) const {
-        if (!sample.has_gradient) sample.gradient = gradient_at(sample), sample.has_gradient = true;
-        return sample.gradient;
-    }
-    // The raw gradient at `part` 2^-bits of the way from one sample to the other.
-    std::array<W, 3> gradient_between(const Sample<W>& front, const Sample<W>& back, int part,
-                                      int bits) const {
-        observer_.at(Part::location);
-        Sample<W> sample;
-        sample.location = location_between(plan_.inside, front.location, back.location, part, bits);
-        sample.position = position_of(sample.location);
-        return gradient_at(sample);
-    }
-    // Stages 1 and 2 there.
-    Sample<W> sample_between(const Sample<W>& front, const Sample<W>& back, int part, int bits) const {
-        observer_.at(Part::location);
-        return sample_at(location_between(plan_.inside, front.location, back.location, part, bits));
-    }
-
-    // Stage 2 at a location.
-    Sample<W> sample_at(const std::array<W, 3>& location) const {
-        Sample<W> sample = scalar_at(location);
-        observer_.at(Part::input);
-        sample.input = classification_input(plan_.input, sample.scalar);
-        return sample;
-    }
-    Sample<W> scalar_at(const std::array<W, 3>& location) const {
-        Sample<W> sample;
-        sample.location = location;
-        sample.position = position_of(location);
-        observer_.at(Part::interpolation);
-        sample.scalar =
-            interpolate(plan_.interpolation, voxels_.cell(sample.position.cell), sample.position.weight);
-        return sample;
-    }
-
-    CellPosition<W> position_of(const std::array<W, 3>& location) const {
-        CellPosition<W> position = cell_position(plan_.location, location);
-        // A place inside a cell is at most 1: intervals cannot see that.
-        for (W& w : position.weight) w = within(w, 0, std::int64_t{1} << plan_.interpolation.weight_bits);
-        return position;
-    }
-
-    // Stage 3 at a sample: the raw gradient, per smallest voxel spacing.
-    std::array<W, 3> gradient_at(const Sample<W>& sample) const {
-        const GradientStage& s = plan_.gradient;
-        std::array<W, 3> gradient;
-        Neighbourhood<W> near;
-        if (s.rule != GradientRule::central_samples) near = voxels_.neighbourhood(sample.position.cell);
-        for (int axis = 0; axis < 3; ++axis) {
-            const auto a = static_cast<std::size_t>(axis);
-            W component;
-            if (s.rule == GradientRule::central_samples) {
-                const W ahead = scalar_beside(sample, axis, true),
-                        behind = scalar_beside(sample, axis, false);
-                observer_.at(Part::gradient);
-                component = sample_difference(s, ahead, behind);
-            } else {
-                observer_.at(Part::gradient);
-                component = voxel_difference(s, near, sample.position.weight, axis);
-            }
-            gradient[a] = to_world(s, component, axis);
-        }
-        if (!s.exaggerated.wanted) return gradient;
-        observer_.at(Part::gradient);
-        return exaggerated_gradient(plan_, voxels_, sample.position.cell, sample.position.weight, gradient);
-    }
-    W scalar_beside(const Sample<W>& sample, int axis, bool ahead) const {
-        observer_.at(Part::location);
-        std::array<W, 3> location = sample.location;
-        const auto a = static_cast<std::size_t>(axis);
-        location[a] = beside(plan_.location, location[a], axis, ahead);
-        return scalar_at(location).scalar;
-    }
-
-    const Plan& plan_;
     const M& method_;
-    const Voxels& voxels_;
-    const RayWords<W>& ray_;
-    Observer& observer_;
     W last_;
     bool backwards_;
     bool carries_ = false;  // front_ and back_ hold the samples of the last slab

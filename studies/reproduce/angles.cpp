@@ -30,13 +30,13 @@ Counts counts_along(const Plan& plan, const M& method, int column, int row) {
     const RayWords<W> ray = ray_words<W>(plan, setup);
     const Silent silent;
     const FromVolume voxels{*plan.volume};
-    const Slabs<W, M, FromVolume> slabs(plan, method, voxels, ray, constant<W>(setup.slabs), silent);
+    const Places<W, FromVolume> places(plan, voxels, ray, silent);
     const W full = constant<W>(std::int64_t{1} << plan.location.length_fraction);
-    Sample<W> front = slabs.sample(constant<W>(0));
+    Sample<W> front = places.sample(constant<W>(0));
     for (int k = 0; k < setup.slabs; ++k) {
-        Sample<W> back = slabs.sample(constant<W>(k + 1));
+        Sample<W> back = places.sample(constant<W>(k + 1));
         if (classify(method, front.input, back.input, full).alpha.v > 0) {
-            const Vec3 a = vector_of(slabs.gradient(front)), b = vector_of(slabs.gradient(back));
+            const Vec3 a = vector_of(places.gradient_of(front)), b = vector_of(places.gradient_of(back));
             const double lengths = std::sqrt(a.dot(a) * b.dot(b));
             if (lengths > 0) {
                 const double cosine = a.dot(b) / lengths;
