@@ -96,6 +96,14 @@ HWY_INLINE std::array<W, 4> along_arc(const KeptLength& k, W front, W back, W le
     return {front, between(front, back), between(back, front), back};
 }
 
+/// What the scene's model reflects about one normal.  A call, for slabs that ask for three of them.
+template <class W>
+HWY_NOINLINE Reflection<W> reflection_of(const ShadingStage& s, const RayWords<W>& ray,
+                                         const std::array<W, 3>& normal, W confidence) {
+    return with_model(
+        s.model, [&](auto model) SQUINT_WRITTEN_OUT { return reflect(model, s, ray, normal, confidence); });
+}
+
 /// Lights a slab whose tables say where its light lies: by what two normals make of it, in between with the way,
 /// or kept at length one.  `color` comes back lit.
 template <class W>
@@ -106,30 +114,27 @@ HWY_INLINE void shade_fading(const ShadingStage& s, const RayWords<W>& ray,
     const bool arcs = s.kept.wanted;
     const W straight = constant<W>(std::int64_t{1} << KeptLength::kArcBits);
     const W arc = arcs ? arc_between(s, normal[0], normal[1]) : straight;
-    with_model(s.model, [&]<class M>(M model) SQUINT_WRITTEN_OUT {
-        const Reflection<W> front = reflect(model, s, ray, normal[0], certain[0]),
-                            back = reflect(model, s, ray, normal[1], certain[1]),
-                            level = reflect(model, s, ray, std::array<W, 3>{zero, zero, zero}, zero);
-        const auto along = [&](W from, W to, W middle, W h) SQUINT_WRITTEN_OUT {
-            return arcs ? along_arc(s.kept, from, to, middle, h) : std::array<W, 4>{from, to, zero, zero};
-        };
-        for (std::size_t c = 0; c < 3; ++c) {
-            const std::size_t i = front.white ? 0 : c;
-            // A highlight is no quadratic: it fades.
-            const W bent = M::kHasHighlights ? straight : arc;
-            const std::array<W, 4> diffuse = along(front.diffuse[i], back.diffuse[i], level.diffuse[i], arc),
-                                   specular =
-                                       along(front.specular[i], back.specular[i], level.specular[i], bent);
-            W sum = zero, opacity = zero;
-            for (std::size_t k = 0; k < static_cast<std::size_t>(light.count); ++k) {
-                sum = sum + light.part[k][c] * diffuse[k] + light.part[k][3] * specular[k];
-                opacity = opacity + light.part[k][3];
-            }
-            color[c] = quantise(sum, s.to_lit);
-            if (M::kHeldToOpacity || s.kept.held)
-                color[c] = min(color[c], quantise(shift_left(opacity, s.intensity_fraction), s.to_lit));
+    // A highlight is no quadratic: it fades.
+    const W bent = with_model(s.model, [](auto model) { return model.kHasHighlights; }) ? straight : arc;
+    const bool held = s.kept.held || with_model(s.model, [](auto model) { return model.kHeldToOpacity; });
+    const Reflection<W> front = reflection_of(s, ray, normal[0], certain[0]),
+                        back = reflection_of(s, ray, normal[1], certain[1]),
+                        level = reflection_of(s, ray, std::array<W, 3>{zero, zero, zero}, zero);
+    const auto along = [&](W from, W to, W middle, W h) SQUINT_WRITTEN_OUT {
+        return arcs ? along_arc(s.kept, from, to, middle, h) : std::array<W, 4>{from, to, zero, zero};
+    };
+    for (std::size_t c = 0; c < 3; ++c) {
+        const std::size_t i = front.white ? 0 : c;
+        const std::array<W, 4> diffuse = along(front.diffuse[i], back.diffuse[i], level.diffuse[i], arc),
+                               specular = along(front.specular[i], back.specular[i], level.specular[i], bent);
+        W sum = zero, opacity = zero;
+        for (std::size_t k = 0; k < static_cast<std::size_t>(light.count); ++k) {
+            sum = sum + light.part[k][c] * diffuse[k] + light.part[k][3] * specular[k];
+            opacity = opacity + light.part[k][3];
         }
-    });
+        color[c] = quantise(sum, s.to_lit);
+        if (held) color[c] = min(color[c], quantise(shift_left(opacity, s.intensity_fraction), s.to_lit));
+    }
 }
 
 }  // namespace squint::HWY_NAMESPACE
