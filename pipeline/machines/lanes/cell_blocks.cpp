@@ -24,6 +24,14 @@ Index3 blocks_of(const Volume& volume) {
 int cell_bytes_of(const Volume& volume) {
     return volume.type == ScalarType::u8 ? 8 : 16;
 }
+/// Whether near blocks have a table, which takes eight times the room of their slots.
+bool has_near(const Index3& blocks) {
+    constexpr std::int64_t kMostBlocks = 1 << 20;
+    // So that CellBlocks::kNotThere and all starts fit.
+    const bool are_few = blocks.x + (blocks.y << CellBlocks::kBits) + (blocks.z << 2 * CellBlocks::kBits) <
+                         1 << (29 - CellBlocks::kBits);
+    return are_few && blocks.x * blocks.y * blocks.z <= kMostBlocks;
+}
 /// The volume without ownership of its voxels: what is cached for them must not keep them alive.
 Volume borrowed(const Volume& volume) {
     Volume view = volume;
@@ -40,7 +48,8 @@ std::int64_t CellBlocks::bytes_of_all(const Volume& volume) {
 
 std::int64_t CellBlocks::table_bytes_of(const Volume& volume) {
     const Index3 n = blocks_of(volume);
-    return n.x * n.y * n.z * static_cast<std::int64_t>(sizeof(std::int32_t));
+    return n.x * n.y * n.z *
+           static_cast<std::int64_t>(sizeof(std::int32_t) + (has_near(n) ? sizeof(Near) : 0));
 }
 
 CellBlocks::CellBlocks(const Volume& volume, std::int64_t most_bytes)
@@ -68,12 +77,40 @@ CellBlocks::~CellBlocks() {
 
 std::int64_t CellBlocks::bytes() const {
     const std::lock_guard lock(mutex_);
-    return taken_ * block_bytes_ + static_cast<std::int64_t>(slots_.size() * sizeof(slots_[0]));
+    return taken_ * block_bytes_ + static_cast<std::int64_t>(slots_.size() * sizeof(slots_[0]) +
+                                                             (near_ ? near_->size() * sizeof(Near) : 0));
 }
 
 std::vector<std::int32_t> CellBlocks::slots() const {
     const std::lock_guard lock(mutex_);
     return slots_;
+}
+
+std::shared_ptr<const std::vector<CellBlocks::Near>> CellBlocks::near() const {
+    const std::lock_guard lock(mutex_);
+    return near_;
+}
+
+void CellBlocks::find_near() {
+    if (!has_near(blocks_)) return;
+    auto near = std::make_shared<std::vector<Near>>(slots_.size());
+    std::size_t at = 0;
+    for (std::int64_t z = 0; z < blocks_.z; ++z)
+        for (std::int64_t y = 0; y < blocks_.y; ++y)
+            for (std::int64_t x = 0; x < blocks_.x; ++x, ++at)
+                for (std::int64_t i = 0; i < 8; ++i) {
+                    const auto along = [&](int a, std::int64_t first) {
+                        return std::min(first + ((first ^ (i >> a)) & 1), blocks_[a] - 1);
+                    };
+                    const Index3 block(along(0, x), along(1, y), along(2, z));
+                    const std::int32_t slot = slots_[static_cast<std::size_t>(
+                        (block.z * blocks_.y + block.y) * blocks_.x + block.x)];
+                    const std::int64_t corner = (block.x + (block.y << kBits) + (block.z << 2 * kBits))
+                                                << kBits;
+                    (*near)[at].start[i] =
+                        slot == kNotBuilt ? kNotThere : static_cast<std::int32_t>(slot - corner);
+                }
+    near_ = std::move(near);
 }
 
 void CellBlocks::build(const std::function<bool(std::int64_t)>& wanted) {
@@ -95,6 +132,7 @@ void CellBlocks::build(const std::function<bool(std::int64_t)>& wanted) {
     // A thread that waits here must not take up work that needs this lock.
     tbb::this_task_arena::isolate([&] { tbb::parallel_for(std::size_t{0}, fresh.size(), fill_block); });
     taken_ += static_cast<std::int64_t>(fresh.size());
+    if (!near_ || !fresh.empty()) find_near();
 }
 
 template <class T>

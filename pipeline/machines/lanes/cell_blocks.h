@@ -25,7 +25,7 @@ class CellBlocks {
 
     /// The bytes of all cells of a volume.
     static std::int64_t bytes_of_all(const Volume& volume);
-    /// The bytes of the table that says where blocks lie.
+    /// The bytes of the tables that say where blocks lie.
     static std::int64_t table_bytes_of(const Volume& volume);
 
     /// Builds the blocks that wanted(block) accepts and that are missing, while there is room.
@@ -33,6 +33,15 @@ class CellBlocks {
     /// The first cell of each block, counted in cells from data(); -1 for a block that is not built.  Built
     /// blocks never move.
     std::vector<std::int32_t> slots() const;
+
+    /// Of two neighbouring blocks along each axis, where the first cell of the volume would lie if all were in
+    /// that block.  Number i is of the block whose number along axis a is odd where bit a of i is set.
+    struct alignas(32) Near {
+        std::int32_t start[8];
+    };
+    static constexpr std::int32_t kNotThere = -0x40000000;  // stays below zero for all cells
+    /// For each block and those after it; null where blocks are too many.
+    std::shared_ptr<const std::vector<Near>> near() const;
     /// Corners x fastest, in the volume's own type.
     const std::uint8_t* data() const { return data_; }
     Index3 blocks() const { return blocks_; }
@@ -43,6 +52,7 @@ class CellBlocks {
   private:
     template <class T>
     void fill(std::int64_t index, T* cells) const;
+    void find_near();
 
     const Volume volume_;
     Index3 blocks_{0, 0, 0};
@@ -51,6 +61,7 @@ class CellBlocks {
     mutable std::mutex mutex_;
     std::vector<std::int32_t> slots_;
     std::int64_t taken_ = 0;  // blocks
+    std::shared_ptr<const std::vector<Near>> near_;
 };
 
 /// The cells of a volume, cached while its voxels live.  A later call may ask for other room: `strictly` for

@@ -38,18 +38,16 @@ class CellPlaces {
     HWY_INLINE explicit CellPlaces(const lanes::VoxelSource& source)
         : slots_(source.slots.data()),
           row_(static_cast<lanes::Word>(source.blocks.x)),
-          slice_(static_cast<lanes::Word>(source.blocks.x * source.blocks.y)),
-          last_{static_cast<lanes::Word>(source.blocks.x - 1), static_cast<lanes::Word>(source.blocks.y - 1),
-                static_cast<lanes::Word>(source.blocks.z - 1)},
-          are_few_(source.blocks.x + (source.blocks.y << kBits) + (source.blocks.z << 2 * kBits) <
-                   1 << (29 - kBits)) {}
+          slice_(static_cast<lanes::Word>(source.blocks.x * source.blocks.y)) {}
 
     /// Of cells (x, y, z): among all cells, or -1 where there is none.
     HWY_INLINE Words operator()(Words x, Words y, Words z) const {
         const hn::ScalableTag<lanes::Word> d;
         const auto in_block = hn::Set(d, (1 << kBits) - 1);
+        const auto block_row = hn::Mul(hn::Set(d, row_), hn::ShiftRight<kBits>(y)),
+                   block_slice = hn::Mul(hn::Set(d, slice_), hn::ShiftRight<kBits>(z));
         const auto slot =
-            slot_of(hn::ShiftRight<kBits>(x), hn::ShiftRight<kBits>(y), hn::ShiftRight<kBits>(z));
+            hn::GatherIndex(d, slots_, hn::Add(hn::ShiftRight<kBits>(x), hn::Add(block_row, block_slice)));
         const auto offset =
             hn::Or(hn::And(x, in_block), hn::Or(hn::ShiftLeft<kBits>(hn::And(y, in_block)),
                                                 hn::ShiftLeft<2 * kBits>(hn::And(z, in_block))));
@@ -57,17 +55,8 @@ class CellPlaces {
     }
 
   private:
-    friend class NearPlaces;
-    /// Of blocks (x, y, z).
-    HWY_INLINE Words slot_of(Words x, Words y, Words z) const {
-        const hn::ScalableTag<lanes::Word> d;
-        const auto block = hn::Add(x, hn::Add(hn::Mul(hn::Set(d, row_), y), hn::Mul(hn::Set(d, slice_), z)));
-        return hn::GatherIndex(d, slots_, block);
-    }
-
     const std::int32_t* slots_;
-    lanes::Word row_, slice_, last_[3];  // last_: the last block along each axis
-    bool are_few_;                       // see NearPlaces::kNotThere
+    lanes::Word row_, slice_;
 };
 
 /// Places of cells in at most two neighbouring blocks along each axis, whose slots fit a register: a gather costs
@@ -80,33 +69,34 @@ class NearPlaces {
   public:
     static constexpr bool kFits = HWY_LANES(lanes::Word) >= 8;
 
-    HWY_INLINE NearPlaces() : starts_(hn::Zero(D())) {}
+    HWY_INLINE explicit NearPlaces(const lanes::VoxelSource& source)
+        : near_(source.near ? source.near->data() : nullptr),
+          row_(source.blocks.x),
+          slice_(source.blocks.x * source.blocks.y),
+          starts_(hn::Zero(D())) {}
 
     /// Takes the slots of the blocks between cells `low` and `high`, each of some lane.  Returns false, and takes
     /// none, where they are more blocks.
-    HWY_INLINE bool take(const CellPlaces& places, const std::array<Words, 3>& low,
-                         const std::array<Words, 3>& high) {
-        const D d;
-        if (!places.are_few_) return false;
-        const auto one = hn::Set(d, 1);
-        const auto block_of = [&](Words cell) HWY_ATTR { return hn::ShiftRight<kBits>(cell); };
-        const auto first_of = [&](std::size_t a) HWY_ATTR { return hn::MinOfLanes(d, block_of(low[a])); };
-        const Words first[3] = {first_of(0), first_of(1), first_of(2)};
-        const auto beyond = [&](std::size_t a)
-                                HWY_ATTR { return hn::Gt(hn::Sub(block_of(high[a]), first[a]), one); };
-        if (!hn::AllFalse(d, hn::Or(beyond(0), hn::Or(beyond(1), beyond(2))))) return false;
-        // Lane i is for blocks whose number along axis a is odd where bit a of i is set.
-        const auto lane = hn::Iota(d, 0);
-        const auto along = [&](std::size_t a, Words odd) HWY_ATTR {
-            return hn::Min(hn::Add(first[a], hn::And(hn::Xor(first[a], odd), one)),
-                           hn::Set(d, places.last_[a]));
-        };
-        const Words x = along(0, lane), y = along(1, hn::ShiftRight<1>(lane)),
-                    z = along(2, hn::ShiftRight<2>(lane));
-        const auto slot = places.slot_of(x, y, z);
-        const auto to_corner = hn::ShiftLeft<kBits>(joined(x, y, z));
-        starts_ = hn::IfThenElse(hn::Lt(slot, hn::Zero(d)), hn::Set(d, kNotThere), hn::Sub(slot, to_corner));
-        return true;
+    HWY_INLINE bool take(const std::array<Words, 3>& low, const std::array<Words, 3>& high) {
+        if constexpr (kFits) {
+            const D d;
+            if (!near_) return false;
+            std::int64_t first[3];
+            auto beyond = hn::Zero(d);
+            for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+                const auto least = hn::MinOfLanes(d, hn::ShiftRight<kBits>(low[a]));
+                beyond = hn::Max(beyond, hn::Sub(hn::ShiftRight<kBits>(high[a]), least));
+                first[a] = hn::GetLane(least);
+            });
+            if (!hn::AllFalse(d, hn::Gt(beyond, hn::Set(d, 1)))) return false;
+            const lanes::Word* starts = near_[first[0] + row_ * first[1] + slice_ * first[2]].start;
+            if constexpr (HWY_LANES(lanes::Word) == 8)
+                starts_ = hn::Load(d, starts);
+            else
+                starts_ = hn::MaskedLoad(hn::FirstN(d, 8), d, starts);
+            return true;
+        }
+        return false;
     }
 
     /// Of cells (x, y, z) among those: among all cells, or below zero where there is none.
@@ -116,16 +106,14 @@ class NearPlaces {
         const auto block = hn::Or(
             hn::And(x, odd), hn::Or(hn::ShiftLeft<1>(hn::And(y, odd)), hn::ShiftLeft<2>(hn::And(z, odd))));
         const auto start = hn::TableLookupLanes(starts_, hn::IndicesFromVec(d, hn::ShiftRight<kBits>(block)));
-        return hn::Add(start, joined(x, y, z));
+        // What one more along an axis adds inside a block.
+        return hn::Add(start, hn::Add(x, hn::Add(hn::ShiftLeft<kBits>(y), hn::ShiftLeft<2 * kBits>(z))));
     }
 
   private:
-    static constexpr lanes::Word kNotThere = -0x40000000;  // stays below zero for any of few blocks' cells
-    /// What one more along an axis adds inside a block.
-    static HWY_INLINE Words joined(Words x, Words y, Words z) {
-        return hn::Add(x, hn::Add(hn::ShiftLeft<kBits>(y), hn::ShiftLeft<2 * kBits>(z)));
-    }
-    Words starts_;  // where the first cell of the volume would lie if all were in this block
+    const lanes::CellBlocks::Near* near_;
+    std::int64_t row_, slice_;
+    Words starts_;
 };
 
 /// Asks memory for the cells of a row of samples that have their places: the outermost rays', or every ray's

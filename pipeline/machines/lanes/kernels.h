@@ -12,6 +12,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,7 @@ struct VoxelSource {
     std::vector<std::int32_t> slots;  // first cell of each block; -1: not built, read the volume
     // A packet's rays lie so far apart that each asks memory for its own voxels.
     bool requests_all = false;
+    std::shared_ptr<const std::vector<CellBlocks::Near>> near;  // may be null
 };
 
 struct StageKernels {
@@ -42,7 +44,8 @@ struct StageKernels {
     void (*prefetch)(const VoxelSource&, int from, int to, Samples&) = nullptr;
     /// Rows [from, to) that have their places: the request alone.
     void (*request)(const VoxelSource&, int from, int to, const Samples&) = nullptr;
-    /// locate and the places of its cells, without a request.
+    /// locate and the places of its cells, without a request.  Cells are stored where keeps_cells(), and where one
+    /// of a vector has no place.
     void (*locate_address)(const Plan&, const VoxelSource&, const RayPacket&, int from, int to,
                            Samples&) = nullptr;
     /// Rows [from, to): loads corners, in pairs.
@@ -160,6 +163,11 @@ StageKernels kernels_for(const Plan& plan, const StageWays& ways, const VoxelSou
                          std::int64_t target);
 
 // One a file of kernels.
+/// Whether cells are read behind stage 2.
+inline bool keeps_cells(const Plan& plan) {
+    return plan.lit || plan.walls.looks_twice;
+}
+
 void ray_kernels(std::int64_t target, StageKernels& kernels);
 void sampling_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, const VoxelSource& source,
                       StageKernels& kernels);

@@ -13,127 +13,174 @@
 #include "pipeline/stages/interpolation-inl.h"
 #include "pipeline/stages/location-inl.h"
 
+#include <limits>
+
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 namespace {
 
 using lanes::kRays;
 
-/// Leaves cells alone.
-struct TakesNoCells {
+/// What becomes of samples' cells: they are stored.
+class KeepsCells {
+  public:
+    HWY_INLINE explicit KeepsCells(lanes::Samples& out) : out_(out) {}
+    /// Cells to come lie between these, lane by lane; or anywhere.
     template <class L>
     HWY_INLINE void between(const std::array<L, 3>&, const std::array<L, 3>&) const {}
     HWY_INLINE void anywhere() const {}
-    template <class L>
-    HWY_INLINE void operator()(int, const std::array<L, 3>&) const {}
-};
-/// Stores the places of samples' cells.
-class TakesPlaces {
-  public:
-    HWY_INLINE TakesPlaces(const lanes::VoxelSource& source, lanes::Samples& out)
-        : places_(source), out_(out) {}
-
-    /// Cells to come lie between these, lane by lane; or anywhere.
-    template <class L>
-    HWY_INLINE void between(const std::array<L, 3>& low, const std::array<L, 3>& high) {
-        if constexpr (NearPlaces::kFits)
-            are_near_ =
-                near_.take(places_, {low[0].v, low[1].v, low[2].v}, {high[0].v, high[1].v, high[2].v});
-    }
-    HWY_INLINE void anywhere() { are_near_ = false; }
     /// Samples `at` and on have these cells.
     template <class L>
     HWY_INLINE void operator()(int at, const std::array<L, 3>& cell) const {
-        if constexpr (NearPlaces::kFits)
-            if (are_near_) return store_whole(L{near_(cell[0].v, cell[1].v, cell[2].v)}, out_.place.v + at);
-        store_whole(L{places_(cell[0].v, cell[1].v, cell[2].v)}, out_.place.v + at);
+        for_three([&](std::size_t a) SQUINT_WRITTEN_OUT { store_whole(cell[a], out_.cell[a].v + at); });
+    }
+
+  private:
+    lanes::Samples& out_;
+};
+/// ... or their places are, and the cells too where one has no place, or where kKeepsCells.
+template <bool kKeepsCells>
+class KeepsPlaces {
+  public:
+    HWY_INLINE KeepsPlaces(const lanes::VoxelSource& source, lanes::Samples& out)
+        : places_(source), near_(source), cells_(out), out_(out) {}
+
+    template <class L>
+    HWY_INLINE void between(const std::array<L, 3>& low, const std::array<L, 3>& high) {
+        are_near_ = near_.take({low[0].v, low[1].v, low[2].v}, {high[0].v, high[1].v, high[2].v});
+    }
+    HWY_INLINE void anywhere() { are_near_ = false; }
+    template <class L>
+    HWY_INLINE void operator()(int at, const std::array<L, 3>& cell) const {
+        const L place{are_near_ ? near_(cell[0].v, cell[1].v, cell[2].v)
+                                : places_(cell[0].v, cell[1].v, cell[2].v)};
+        store_whole(place, out_.place.v + at);
+        if (kKeepsCells || any(place < constant<L>(0))) cells_(at, cell);
     }
 
   private:
     CellPlaces places_;
     NearPlaces near_;
+    KeepsCells cells_;
     bool are_near_ = false;
     lanes::Samples& out_;
 };
 
-/// Stage 1.  `take_cell`: what else is to be done with cells.
-template <class L, bool kKeepsLocation, class TakeCell>
+/// Stage 1.  `keep_cell`: what becomes of cells.
+template <class L, bool kKeepsLocation, class KeepCell>
 HWY_INLINE void locate_into(const Plan& plan, const lanes::RayPacket& packet, int from, int to,
-                            lanes::Samples& out, TakeCell take_cell) {
+                            lanes::Samples& out, KeepCell keep_cell) {
     const LocationStage stage = plan.location;  // a copy: no store can change it
     const L full = constant<L>(std::int64_t{1} << stage.length_fraction);
-    for (int r = 0; r < kRays; r += static_cast<int>(L::count())) {
+    const auto keep = [&](int at, const std::array<L, 3>& location, const CellPosition<L>& position)
+                          SQUINT_WRITTEN_OUT {
+                              for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+                                  store(position.weight[a], out.weight[a].v + at);
+                                  if constexpr (kKeepsLocation) store(location[a], out.location[a].v + at);
+                              });
+                              keep_cell(at, position.cell);
+                          };
+    // P0 + kV by adding V: exact, hence the same, except in floats.
+    struct Part {
+        int at;  // its first ray
         RayWords<L> ray;
-        // P0 + kV by adding V: exact, hence the same, except in floats.
-        std::array<L, 3> exact, strides, location;
-        ray.last_index = load_whole<L>(packet.last_index.v + r);
-        const L start = constant<L>(out.first + from);
+        std::array<L, 3> exact, strides;
+    };
+    Part parts[kRays / L::count()];
+    const L start = constant<L>(out.first + from);
+    int r = 0;
+    for (Part& part : parts) {
+        part.at = r;
         for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
-            ray.first[a] = load<L>(packet.first[a].v + r);
-            ray.last[a] = load<L>(packet.last[a].v + r);
-            ray.step[a] = load<L>(packet.step[a].v + r);
-            exact[a] = exact_location(stage, ray, start, static_cast<int>(a));
-            strides[a] = stride(stage, ray, static_cast<int>(a));
+            part.ray.first[a] = load<L>(packet.first[a].v + r);
+            part.ray.step[a] = load<L>(packet.step[a].v + r);
+            part.exact[a] = exact_location(stage, part.ray, start, static_cast<int>(a));
+            part.strides[a] = stride(stage, part.ray, static_cast<int>(a));
         });
-        const L last_length = load<L>(packet.last_length.v + r);
-        const L slabs = load_whole<L>(packet.slabs.v + r), last_slab = slabs - constant<L>(1);
-        const auto keep = [&](int at, const CellPosition<L>& position, L length) SQUINT_WRITTEN_OUT {
+        r += static_cast<int>(L::count());
+    }
+    if constexpr (!RealWord<L>) {
+        // A batch that ends before any ray's last slab, both ends inside the box: nothing is clamped.
+        const L rows = constant<L>(to - from - 1), end_of_batch = constant<L>(out.first + to - 1);
+        auto leaves = constant<L>(0) < constant<L>(0);
+        const L lowest = constant<L>(std::numeric_limits<std::int32_t>::min()),
+                highest = constant<L>(std::numeric_limits<std::int32_t>::max());
+        std::array<L, 3> low{highest, highest, highest}, high{lowest, lowest, lowest};
+        for (const Part& part : parts) {
+            const L slabs = load_whole<L>(packet.slabs.v + part.at);
+            leaves = leaves | ((constant<L>(0) < slabs) & !(end_of_batch < slabs - constant<L>(1)));
             for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
-                store_whole(position.cell[a], out.cell[a].v + at);
-                store(position.weight[a], out.weight[a].v + at);
-                if constexpr (kKeepsLocation) store(location[a], out.location[a].v + at);
+                const L begin = rounded_inside(stage, part.exact[a]),
+                        end = rounded_inside(stage, part.exact[a] + rows * part.strides[a]);
+                const L least = min(begin, end), most = max(begin, end);
+                leaves = leaves | (least < constant<L>(0)) | !(most < constant<L>(stage.limit[a]));
+                low[a] = min(low[a], least), high[a] = max(high[a], most);
             });
-            store(length, out.length.v + at);
-            take_cell(at, position.cell);
-        };
-        if constexpr (!RealWord<L>) {
-            // A batch that ends before any ray's last slab, both ends inside the box: nothing is clamped.
-            const L rows = constant<L>(to - from - 1);
-            auto leaves = (constant<L>(0) < slabs) & !(constant<L>(out.first + to - 1) < last_slab);
-            std::array<L, 3> low, high;
-            for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
-                const L begin = rounded_inside(stage, exact[a]),
-                        end = rounded_inside(stage, exact[a] + rows * strides[a]);
-                low[a] = min(begin, end), high[a] = max(begin, end);
-                leaves = leaves | (low[a] < constant<L>(0)) | !(high[a] < constant<L>(stage.limit[a]));
-            });
-            if (!any(leaves)) {
-                const auto cells_of = [&](const std::array<L, 3>& at) {
-                    return cell_position_inside(stage, at).cell;
-                };
-                take_cell.between(cells_of(low), cells_of(high));
-                for (int at = from * kRays + r; at < to * kRays; at += kRays) {
-                    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
-                        location[a] = rounded_inside(stage, exact[a]);
-                        exact[a] = exact[a] + strides[a];
-                    });
-                    keep(at, cell_position_inside(stage, location), full);
-                }
-                continue;
-            }
         }
-        take_cell.anywhere();
+        if (!any(leaves)) {
+            const auto cells_of = [&](const std::array<L, 3>& at) {
+                return cell_position_inside(stage, at).cell;
+            };
+            keep_cell.between(cells_of(low), cells_of(high));
+            if (!out.all_full) {
+                const int whole = from == 0 ? lanes::kRows : to;
+                for (int at = from * kRays; at < whole * kRays; at += static_cast<int>(L::count()))
+                    store(full, out.length.v + at);
+                out.all_full = from == 0;
+            }
+            LocationStage inside = stage;
+            L bias = constant<L>(0);
+            if constexpr (L::kKnown == KnownRescales::halves_up) {  // added once, before the first row
+                bias = constant<L>(inside.to_location.bias);
+                inside.to_location.bias = 0;
+            }
+            for (const Part& part : parts) {
+                std::array<L, 3> exact = part.exact, location;
+                for_three([&](std::size_t a) SQUINT_WRITTEN_OUT { exact[a] = exact[a] + bias; });
+                for (int at = from * kRays + part.at; at < to * kRays; at += kRays) {
+                    for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+                        location[a] = rounded_inside(inside, exact[a]);
+                        exact[a] = exact[a] + part.strides[a];
+                    });
+                    keep(at, location, cell_position_inside(stage, location));
+                }
+            }
+            return;
+        }
+    }
+    keep_cell.anywhere();
+    out.all_full = false;
+    for (Part& part : parts) {
+        r = part.at;
+        part.ray.last_index = load_whole<L>(packet.last_index.v + r);
+        for_three([&](std::size_t a)
+                      SQUINT_WRITTEN_OUT { part.ray.last[a] = load<L>(packet.last[a].v + r); });
+        const L last_length = load<L>(packet.last_length.v + r),
+                last_slab = load_whole<L>(packet.slabs.v + r) - constant<L>(1);
         for (int row = from; row < to; ++row) {
             const int at = row * kRays + r;
             const L k = constant<L>(out.first + row);
+            std::array<L, 3> location;
             for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
-                if constexpr (RealWord<L>) exact[a] = exact_location(stage, ray, k, static_cast<int>(a));
-                location[a] = rounded_location(stage, ray, exact[a], k, static_cast<int>(a));
-                if constexpr (!RealWord<L>) exact[a] = exact[a] + strides[a];
+                if constexpr (RealWord<L>)
+                    part.exact[a] = exact_location(stage, part.ray, k, static_cast<int>(a));
+                location[a] = rounded_location(stage, part.ray, part.exact[a], k, static_cast<int>(a));
+                if constexpr (!RealWord<L>) part.exact[a] = part.exact[a] + part.strides[a];
             });
-            keep(at, cell_position(stage, location), select(k == last_slab, last_length, full));
+            keep(at, location, cell_position(stage, location));
+            store(select(k == last_slab, last_length, full), out.length.v + at);
         }
     }
 }
 
 template <class L, bool kKeepsLocation>
 void locate_rows(const Plan& plan, const lanes::RayPacket& packet, int from, int to, lanes::Samples& out) {
-    locate_into<L, kKeepsLocation>(plan, packet, from, to, out, TakesNoCells{});
+    locate_into<L, kKeepsLocation>(plan, packet, from, to, out, KeepsCells(out));
 }
-template <class L, bool kKeepsLocation>
+template <class L, bool kKeepsCells, bool kKeepsLocation>
 void locate_and_address_rows(const Plan& plan, const lanes::VoxelSource& source,
                              const lanes::RayPacket& packet, int from, int to, lanes::Samples& out) {
-    locate_into<L, kKeepsLocation>(plan, packet, from, to, out, TakesPlaces(source, out));
+    locate_into<L, kKeepsLocation>(plan, packet, from, to, out, KeepsPlaces<kKeepsCells>(source, out));
 }
 
 template <class L>
@@ -242,8 +289,9 @@ void fused_kernels_of(const Plan& plan, const lanes::StageWays& ways, const lane
         for (const lanes::StageWay& way : {ways.location, ways.interpolation, ways.input})
             if (missing.empty()) missing = lanes::why_not_narrow(way, kKnown);
         if (!missing.empty()) return kernels.chose(Segment::fetch, "fetch", missing);
-        kernels.locate_address =
-            plan.keeps_locations() ? &locate_and_address_rows<L, true> : &locate_and_address_rows<L, false>;
+        kernels.locate_address = !lanes::keeps_cells(plan) ? &locate_and_address_rows<L, false, false>
+                                 : plan.keeps_locations()  ? &locate_and_address_rows<L, true, true>
+                                                           : &locate_and_address_rows<L, true, false>;
         kernels.chose(Segment::locate_address, "locate+address");
         const bool bytes = source.volume->type == ScalarType::u8;
         kernels.fetch_interpolate = bytes ? &fetch_and_interpolate_rows<L, std::uint8_t, true>

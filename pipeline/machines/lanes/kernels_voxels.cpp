@@ -201,26 +201,36 @@ class CellsBeside {
     static constexpr int kBits = lanes::CellBlocks::kBits;
 
   public:
-    explicit CellsBeside(const VoxelSource& source) : cells_(source.cells), places_(source) {}
+    explicit CellsBeside(const VoxelSource& source) : cells_(source.cells), places_(source), near_(source) {}
 
     /// Stores rows of cells `at` and on in `pair`, as LitSamples has them; lanes from `here` on repeat the first.
     /// All lie at least one voxel from a face.  Returns whether it could: else some cell is not built.
-    HWY_INLINE bool operator()(const lanes::Batch (&cell)[3], int at, int here,
-                               lanes::Batch (&pair)[32]) const {
+    HWY_INLINE bool operator()(const lanes::Batch (&cell)[3], int at, int here, lanes::Batch (&pair)[32]) {
         const D d;
         const auto wanted = hn::FirstN(d, static_cast<std::size_t>(here));
         Words place[3];
         for (int a = 0; a < 3; ++a)
             place[a] = hn::IfThenElse(wanted, hn::Load(d, cell[a].v + at), hn::Set(d, cell[a].v[at]));
-        const Words middle = places_(place[0], place[1], place[2]);
+        std::array<Words, 3> low, high;
+        for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
+            low[a] = hn::Sub(place[a], hn::Set(d, 1)), high[a] = hn::Add(place[a], hn::Set(d, 1));
+        });
         alignas(64) Word beside[3][2][kLanes];
-        auto missing = hn::Lt(middle, hn::Zero(d));
-        for (int a = 0; a < 3; ++a)
-            for (const int ahead : {0, 1}) {
-                const Words there = next_to(place, middle, a, ahead != 0);
-                missing = hn::Or(missing, hn::Lt(there, hn::Zero(d)));
-                hn::Store(there, d, beside[a][ahead]);
-            }
+        auto missing = hn::Lt(place[0], hn::Zero(d));
+        const auto keep = [&](int axis, int ahead, Words there) SQUINT_WRITTEN_OUT {
+            missing = hn::Or(missing, hn::Lt(there, hn::Zero(d)));
+            hn::Store(there, d, beside[axis][ahead]);
+        };
+        if (near_.take(low, high)) {
+            keep(0, 0, near_(low[0], place[1], place[2])), keep(0, 1, near_(high[0], place[1], place[2]));
+            keep(1, 0, near_(place[0], low[1], place[2])), keep(1, 1, near_(place[0], high[1], place[2]));
+            keep(2, 0, near_(place[0], place[1], low[2])), keep(2, 1, near_(place[0], place[1], high[2]));
+        } else {
+            const Words middle = places_(place[0], place[1], place[2]);
+            missing = hn::Lt(middle, hn::Zero(d));
+            for (int a = 0; a < 3; ++a)
+                for (const int ahead : {0, 1}) keep(a, ahead, next_to(place, middle, a, ahead != 0));
+        }
         if (!hn::AllFalse(d, missing)) return false;
         const auto store_row = [&](Words words, int y, int z, int half) {
             hn::Store(words, d, pair[(z * 4 + y) * 2 + half].v + at);
@@ -260,6 +270,7 @@ class CellsBeside {
 
     const std::uint8_t* cells_;
     CellPlaces places_;
+    NearPlaces near_;
 };
 
 template <class T>
@@ -275,7 +286,7 @@ void fetch_lit_samples(const Plan& plan, const VoxelSource& source, int count, l
         return cross && lanes::is_outer_row(row % 4, row / 4);
     };
     const bool from_cells = source.cells && plan.gradient.rule == GradientRule::central;
-    const CellsBeside<T> cells_beside(source);
+    CellsBeside<T> cells_beside(source);
     for (int at = 0; at < count; at += kLanes) {
         auto& pair = lit.pair;
         const auto& cell = lit.cell;

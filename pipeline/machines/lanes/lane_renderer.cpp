@@ -244,8 +244,9 @@ void LaneRenderer::choose_layout(const RenderOptions& options) {
         layout_ = "linear: as asked";
         return;
     }
-    if (options.layout == LayoutRule::automatic && !cells_pay(plan_)) {
-        layout_ = "linear: too few samples for cells to pay";
+    if (const double samples = samples_so_far(plan_);
+        options.layout == LayoutRule::automatic && !cells_pay(volume, samples)) {
+        layout_ = "linear: too few samples so far for cells to pay";
         return;
     }
     const std::int64_t room = std::max<std::int64_t>(room_ - CellBlocks::table_bytes_of(volume), 0);
@@ -265,6 +266,7 @@ std::string words_of(const Plan& plan) {
     if (plan.float32) return "float32 lanes";
     const StageWays ways = ways_of(plan);
     if (plan.projection_mode)
+        voxels_.near = cells_->near();
         return fmt::format("lanes of {}/{} bits (location, interpolation), one classification a ray",
                            ways.location.bits, ways.interpolation.bits);
     std::string text = fmt::format(

@@ -69,6 +69,7 @@ struct Rows {
 /// One batch: row s of ray r is at s * kRays + r.  Row 0 is sample `first`.
 struct alignas(64) Samples {
     Word first = 0;
+    bool all_full = false;  // every length is known to be of a full step, in all rows
     Batch cell[3], weight[3];
     Batch location[3];  // where gradients need locations
     Batch place;        // where the cell lies (VoxelSource): among the cells, or below 0; or its lowest voxel

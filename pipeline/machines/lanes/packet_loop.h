@@ -261,6 +261,7 @@ class PacketLoop {
         };
         move(from.input, to.input), move(from.length, to.length);
         for (int a = 0; a < 3; ++a) move(from.cell[a], to.cell[a]), move(from.weight[a], to.weight[a]);
+        to.all_full = to.all_full && from.all_full;
         for (int a = 0; plan_.keeps_locations() && a < 3; ++a) move(from.location[a], to.location[a]);
         for (Batch& end : w_.end_gradients.component)
             if (plan_.shares_ends()) move(end, end);

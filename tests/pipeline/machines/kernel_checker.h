@@ -58,6 +58,7 @@ inline KernelCase kernel_case(const std::string& name, std::vector<std::string> 
         c.cells->build([](std::int64_t block) { return block % 3 != 0; });  // some cells are put together
         c.source.cells = c.cells->data(), c.source.blocks = c.cells->blocks();
         c.source.slots = c.cells->slots();
+        c.source.near = c.cells->near();
     }
     return c;
 }
@@ -116,7 +117,7 @@ class KernelChecker {
             "set_up", [this] { draw_place(); }, [this] { kernels_.set_up(plan_, place_, rays_); },
             [this] { return set_up_difference(); });
         add(
-            "locate", [this] { draw_rays(), samples_->first = static_cast<Word>(below(rays_.most_slabs)); },
+            "locate", [this] { draw_inputs(), draw_rays(); },
             [this, rows] { kernels_.locate(plan_, rays_, 0, rows, *samples_); },
             [this, rows] { return locate_difference(rows); });
         add(
@@ -136,8 +137,7 @@ class KernelChecker {
             [this, rows] { return interpolate_difference(rows, false); });
         if (kernels_.locate_address)
             add(
-                "locate+address",
-                [this] { draw_rays(), samples_->first = static_cast<Word>(below(rays_.most_slabs)); },
+                "locate+address", [this] { draw_inputs(), draw_cells(), draw_rays(); },
                 [this, rows] { kernels_.locate_address(plan_, c_.source, rays_, 0, rows, *samples_); },
                 [this, rows] { return locate_address_difference(rows); });
         if (kernels_.fetch_interpolate)
@@ -285,6 +285,7 @@ class KernelChecker {
     void draw_slab(Word& alpha, Word* color0, Word* color1, Word* color2) {
         const CompositingStage& s = plan_.compositing;
         const Integer a = below(4) == 0 ? 0 : up_to(one(s.alpha_fraction));
+        samples_->all_full = false;
         alpha = static_cast<Word>(a);
         const int finer = s.color_fraction - s.alpha_fraction;
         const Integer most = !s.premultiplied ? one(s.color_fraction) : finer >= 0 ? a << finer : a >> -finer;
@@ -452,6 +453,15 @@ class KernelChecker {
         const auto place = [](const Samples& s, int i) {
             return std::max(s.place.v[i], -1);
         };  // none is none
+        before_ = *samples_;
+        if (!keeps_cells(plan_)) {
+            kernels_.locate(plan_, rays_, 0, rows, *samples_);
+            for (int i = 0; i < rows * kRays; ++i)
+                for (std::size_t a = 0; a < 3; ++a) {
+                    if (before_.place.v[i] >= 0) before_.cell[a].v[i] = samples_->cell[a].v[i];
+                }
+            std::swap(before_, *samples_);
+        }
         return first_of(rows * kRays,
                         [&](int i) { return differs("place", i, place(*samples_, i), place(before_, i)); });
     }
