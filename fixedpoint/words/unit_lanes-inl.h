@@ -126,6 +126,52 @@ HWY_INLINE UnitParts<L> words_of(UnitLanes x) {
     for_parts<L>([&](std::size_t i) SQUINT_WRITTEN_OUT { words[i] = constant<L>(0) - words[i]; });
     return words;
 }
+
+/// Where word i of block `block` (128 bits) of UnitLanes stands among L's words side by side.
+template <class L>
+constexpr int word_of_unit(int block, int i) {
+    if (kPartsOfUnits<L> == 1 || i < 4) return (kPartsOfUnits<L> == 1 ? 8 : 4) * block + i;
+    return static_cast<int>(L::count()) + 4 * block + i - 4;
+}
+
+/// lerp() of interpolation.h, halves up, between rows row[j] and row[j] + 1 of four numbers each, for word j of L;
+/// `weight` is of 15 bits and below one.  Rows stand as UnitLanes do, and no number goes from 0 to 1 in one row: such
+/// a difference does not fit.
+template <class L>
+HWY_INLINE std::array<UnitLanes, 4> lerp_unit_rows(const std::int16_t* rows, const std::int32_t* row,
+                                                   hn::Vec<UnitLanes::D> weight) {
+    const UnitLanes::D d;
+    const hn::Repartition<std::int32_t, UnitLanes::D> d32;
+    const hn::Repartition<std::int64_t, UnitLanes::D> d64;
+    const auto load = [&](int i) HWY_ATTR {  // words i of all blocks: their rows and the next ones
+        const hn::Full128<std::int16_t> block;
+        const auto of = [&](int b) HWY_ATTR {
+            return hn::LoadU(block, rows + std::int64_t{4} * row[word_of_unit<L>(b, i)]);
+        };
+        if constexpr (UnitLanes::count() == 8)
+            return of(0);
+        else
+            return hn::Combine(d, of(1), of(0));
+    };
+    const auto between = [&](int i,
+                             auto weights) HWY_ATTR {  // words i and i + 1, side by side in each column
+        const auto first = load(i), second = load(i + 1);
+        const auto near = hn::InterleaveLower(d, first, second), far = hn::InterleaveUpper(d, first, second);
+        const auto part = hn::MulFixedPoint15(hn::Sub(near, far), hn::BitCast(d, weights));
+        return hn::BitCast(d32, hn::Sub(near, part));
+    };
+    const auto weights = hn::BitCast(d32, weight);
+    const auto a = between(0, hn::Broadcast<0>(weights)), b = between(2, hn::Broadcast<1>(weights)),
+               c = between(4, hn::Broadcast<2>(weights)), e = between(6, hn::Broadcast<3>(weights));
+    const auto wide = [&](auto v) HWY_ATTR { return hn::BitCast(d64, v); };
+    const auto ab = wide(hn::InterleaveLower(d32, a, b)), ce = wide(hn::InterleaveLower(d32, c, e)),
+               ab_upper = wide(hn::InterleaveUpper(d32, a, b)),
+               ce_upper = wide(hn::InterleaveUpper(d32, c, e));
+    const auto unit = [&](auto v) HWY_ATTR { return UnitLanes{hn::BitCast(d, v)}; };
+    return {unit(hn::InterleaveLower(d64, ab, ce)), unit(hn::InterleaveUpper(d64, ab, ce)),
+            unit(hn::InterleaveLower(d64, ab_upper, ce_upper)),
+            unit(hn::InterleaveUpper(d64, ab_upper, ce_upper))};
+}
 #else
 inline constexpr bool kHasUnitLanes = false;
 #endif

@@ -115,9 +115,9 @@ struct StageKernels {
     /// `between` receives T at the slabs' ends: row s at the front of slab s.
     void (*composite)(const Plan&, const RayPacket&, int steps, const Samples&, PixelPacket&,
                       Batch& between) = nullptr;
-    /// classify and composite, where nothing stands between them.
-    void (*classify_composite)(const Plan&, const RayPacket&, int steps, const Samples&,
-                               PixelPacket&) = nullptr;
+    /// classify and composite, where nothing stands between them; `rows` are unit_rows.
+    void (*classify_composite)(const Plan&, const std::int16_t* rows, const RayPacket&, int steps,
+                               const Samples&, PixelPacket&) = nullptr;
     /// Stores R G B A of a packet's pixels in an image.
     void (*store_colors)(const Plan&, const PixelPacket&, const PacketPlace&, Image&) = nullptr;
     /// In place of classifying and compositing: adds the inputs of slabs [0, steps) to the projection of
@@ -129,6 +129,10 @@ struct StageKernels {
     void chose(Segment segment, std::string name, std::string why_not_faster = {}) {
         instances[static_cast<std::size_t>(segment)] = {std::move(name), std::move(why_not_faster)};
     }
+
+    /// The entries' rows as UnitLanes (fixedpoint/words/unit_lanes-inl.h), the last one twice; empty where they do
+    /// not fit.
+    std::vector<std::int16_t> unit_rows;
 };
 
 /// How one stage runs: bits of its lanes (32 or 64) and what its kernel may assume; or in floats.
@@ -159,15 +163,15 @@ std::int64_t find_target(const std::string& name);
 std::vector<std::string> target_names();  // best first
 std::string target_name(std::int64_t target);
 
-StageKernels kernels_for(const Plan& plan, const StageWays& ways, const VoxelSource& source,
-                         std::int64_t target);
-
-// One a file of kernels.
 /// Whether cells are read behind stage 2.
 inline bool keeps_cells(const Plan& plan) {
     return plan.lit || plan.walls.looks_twice;
 }
 
+StageKernels kernels_for(const Plan& plan, const StageWays& ways, const VoxelSource& source,
+                         std::int64_t target);
+
+// One a file of kernels.
 void ray_kernels(std::int64_t target, StageKernels& kernels);
 void sampling_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, const VoxelSource& source,
                       StageKernels& kernels);

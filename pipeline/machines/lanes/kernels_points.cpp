@@ -36,6 +36,7 @@ void classify_paired_points(const Plan& plan, int steps, lanes::Samples& samples
 }
 
 #if HWY_ARCH_X86 && HWY_TARGET <= HWY_SSE4
+using U = UnitLanes;
 using Parts = UnitParts<L>;
 
 HWY_INLINE Parts load_parts(const lanes::Word* from) {
@@ -46,14 +47,107 @@ HWY_INLINE Parts load_parts(const lanes::Word* from) {
 HWY_INLINE void store_parts(const Parts& parts, lanes::Word* to) {
     for_parts<L>([&](std::size_t i) SQUINT_WRITTEN_OUT { store(parts[i], to + i * L::count()); });
 }
+/// Whether f(i) holds in a lane of some part.
+template <class F>
+HWY_INLINE bool any_part(F&& f) {
+    auto mask = f(std::size_t{0});
+    if constexpr (kPartsOfUnits<L> == 2) mask = mask | f(std::size_t{1});
+    return any(mask);
+}
+
+/// Points between paired rows, in 32 bits, narrowed then.
+class NarrowedPoints {
+  public:
+    HWY_INLINE NarrowedPoints(const Plan& plan, const std::int16_t*) : points_(plan) {}
+    HWY_INLINE Slab<U> classify(const Parts& input, const lanes::Samples& samples, int at) const {
+        std::array<Parts, 3> color;
+        Parts alpha;
+        for_parts<L>([&](std::size_t i) SQUINT_WRITTEN_OUT {
+            const Slab<L> slab = points_.classify(input[i], load<L>(samples.length.v + at + i * L::count()));
+            for_three([&](std::size_t c) SQUINT_WRITTEN_OUT { color[c][i] = slab.color[c]; });
+            alpha[i] = slab.alpha;
+        });
+        return {{units_of<L>(color[0]), units_of<L>(color[1]), units_of<L>(color[2])}, units_of<L>(alpha)};
+    }
+
+  private:
+    PairedPoints<L> points_;
+};
+
+/// Points between rows of 16 bits.
+class UnitPoints {
+  public:
+    HWY_INLINE UnitPoints(const Plan& plan, const std::int16_t* rows)
+        : entries_(std::get<PostClassification>(plan.method).entries),
+          rows_(rows),
+          weight_bits_(weight_bits_of(entries_)),
+          full_(constant<L>(std::int64_t{1} << entries_.length_fraction)),
+          below_opaque_(constant<U>(entries_.has_opaque ? entries_.least_opaque - 1 : 1 << 15)) {}
+
+    /// See StageKernels::unit_rows.
+    static std::vector<std::int16_t> rows_of(const EntryLookup& e) {
+        const int bits = weight_bits_of(e);
+        if (bits < 1 || bits > 15 || e.to_color.shift != bits || e.to_alpha.shift != bits) return {};
+        constexpr std::int64_t kOne = 1 << 15;
+        std::vector<std::int16_t> rows(static_cast<std::size_t>(4 * (e.table.rows() + 1)));
+        for (int i = 0; i <= e.table.rows(); ++i)
+            for (int c = 0; c < 4; ++c) {
+                const std::int64_t word = e.table.word(std::min(i, e.table.rows() - 1), c);
+                const std::int64_t before = i == 0 ? word : e.table.word(i - 1, c);
+                if (word < 0 || word > kOne || word - before == kOne) return {};
+                rows[static_cast<std::size_t>(4 * i + c)] = static_cast<std::int16_t>(-word);
+            }
+        return rows;
+    }
+
+    HWY_INLINE Slab<U> classify(const Parts& input, const lanes::Samples& samples, int at) const {
+        // Inputs end at the last entry; its row stands twice, so that nothing is clamped.
+        alignas(64) std::int32_t row[U::count()];
+        Parts weight;
+        for_parts<L>([&](std::size_t i) SQUINT_WRITTEN_OUT {
+            store(floor_shift(input[i], weight_bits_), row + i * L::count());
+            weight[i] = fraction_bits(input[i], weight_bits_);
+        });
+        const std::array<U, 4> between =
+            lerp_unit_rows<L>(rows_, row, hn::ShiftLeftSame(narrow_words<L>(weight), 15 - weight_bits_));
+        Slab<U> slab{{between[0], between[1], between[2]}, between[EntryLookup::alpha]};
+        const bool some_short = !samples.all_full && any_part([&](std::size_t i) SQUINT_WRITTEN_OUT {
+            return load<L>(samples.length.v + at + i * L::count()) < full_;
+        });
+        if (some_short || any(below_opaque_ < slab.alpha)) finish(input, samples, at, slab);
+        return slab;
+    }
+
+  private:
+    static int weight_bits_of(const EntryLookup& e) { return e.input_fraction - e.row_bits; }
+    /// Few points need this.
+    HWY_NOINLINE void finish(const Parts& input, const lanes::Samples& samples, int at, Slab<U>& slab) const {
+        const Parts between[] = {words_of<L>(slab.color[0]), words_of<L>(slab.color[1]),
+                                 words_of<L>(slab.color[2]), words_of<L>(slab.alpha)};
+        Parts alpha;
+        for_parts<L>([&](std::size_t i) SQUINT_WRITTEN_OUT {
+            alpha[i] =
+                finish_point(entries_, input[i], {between[0][i], between[1][i], between[2][i], between[3][i]},
+                             load<L>(samples.length.v + at + i * L::count()))
+                    .alpha;
+        });
+        slab.alpha = units_of<L>(alpha);
+    }
+
+    const EntryLookup& entries_;
+    const std::int16_t* rows_;
+    int weight_bits_;
+    L full_;
+    U below_opaque_;
+};
 
 /// Colours and opacities stay in registers, and are composited in 16 bits.
-void classify_and_composite_points(const Plan& plan, const lanes::RayPacket& packet, int steps,
-                                   const lanes::Samples& samples, lanes::PixelPacket& pixels) {
-    using U = UnitLanes;
+template <class Points>
+void classify_and_composite_points(const Plan& plan, const std::int16_t* rows, const lanes::RayPacket& packet,
+                                   int steps, const lanes::Samples& samples, lanes::PixelPacket& pixels) {
     CompositingStage stage = plan.compositing;
     UnitCompositing::assume(stage);
-    const PairedPoints<L> points(plan);
+    const Points points(plan, rows);
     const Unseen<L> unseen(plan);
     const U zero = constant<U>(0), one = constant<U>(1);
     for (int r = 0; r < lanes::kRays; r += static_cast<int>(U::count())) {
@@ -71,22 +165,14 @@ void classify_and_composite_points(const Plan& plan, const lanes::RayPacket& pac
             if (!any(active)) break;
             count = count + only(active, one);
             const int at = step * lanes::kRays + r;
-            const Parts input = load_parts(samples.input.v + at), length = load_parts(samples.length.v + at);
-            bool seen = false;
-            for_parts<L>([&](std::size_t i)
-                             SQUINT_WRITTEN_OUT { seen |= !unseen.holds(input[i], input[i]); });
-            if (!seen) continue;
-            std::array<Parts, 3> color;
-            Parts opacity;
-            for_parts<L>([&](std::size_t i) SQUINT_WRITTEN_OUT {
-                const Slab<L> slab = points.classify(input[i], length[i]);
-                for_three([&](std::size_t c) SQUINT_WRITTEN_OUT { color[c][i] = slab.color[c]; });
-                opacity[i] = slab.alpha;
-            });
+            const Parts input = load_parts(samples.input.v + at);
+            if (unseen.left_out &&
+                !any_part([&](std::size_t i) SQUINT_WRITTEN_OUT { return unseen.seen(input[i], input[i]); }))
+                continue;
+            const Slab<U> slab = points.classify(input, samples, at);
             // Transparent slabs change nothing: those of rays that have ended, too.
-            const U alpha = only(active, units_of<L>(opacity));
-            take_contribution(stage, pixel,
-                              {units_of<L>(color[0]), units_of<L>(color[1]), units_of<L>(color[2])},
+            const U alpha = only(active, slab.alpha);
+            take_contribution(stage, pixel, slab.color,
                               rounded_contribution(stage, alpha, pixel.transparency));
             active = active & goes_on(stage, pixel);
         }
@@ -102,9 +188,16 @@ void classify_and_composite_points(const Plan& plan, const lanes::RayPacket& pac
     }
 }
 
-constexpr auto kClassifyComposite = &classify_and_composite_points;
+void choose_fused(const EntryLookup& entries, lanes::StageKernels& kernels) {
+    kernels.unit_rows = UnitPoints::rows_of(entries);
+    const bool fit = !kernels.unit_rows.empty();
+    kernels.classify_composite =
+        fit ? &classify_and_composite_points<UnitPoints> : &classify_and_composite_points<NarrowedPoints>;
+    kernels.chose(lanes::Segment::classify_composite, "classify+composite.unit15",
+                  fit ? "" : "rows do not fit 16 bits");
+}
 #else
-constexpr decltype(lanes::StageKernels::classify_composite) kClassifyComposite = nullptr;
+void choose_fused(const EntryLookup&, lanes::StageKernels&) {}
 #endif
 
 }  // namespace
@@ -118,11 +211,10 @@ void point_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::Sta
     kernels.classify = &classify_paired_points;
     const OutputSettings& output = plan.scene.output;
     const bool noted = plan.wants_depth || output.depth || output.normals;
-    if (!kClassifyComposite || noted || !UnitCompositing::hold(plan.compositing) ||
+    if (noted || !UnitCompositing::hold(plan.compositing) ||
         !lanes::why_not_narrow(ways.compositing, KnownRescales::nothing).empty())
         return;
-    kernels.classify_composite = kClassifyComposite;
-    kernels.chose(lanes::Segment::classify_composite, "classify+composite.unit15");
+    choose_fused(std::get<PostClassification>(plan.method).entries, kernels);
 }
 
 }  // namespace squint::HWY_NAMESPACE

@@ -242,7 +242,8 @@ class PacketLoop {
             case Segment::composite:
                 return composite(slabs);
             case Segment::classify_composite:
-                return kernels_.classify_composite(plan_, w_.rays, slabs, s, w_.pixels);
+                return kernels_.classify_composite(plan_, kernels_.unit_rows.data(), w_.rays, slabs, s,
+                                                   w_.pixels);
             case Segment::project:
                 return kernels_.project(w_.rays, slabs, s, w_.projection);
         }
@@ -260,8 +261,8 @@ class PacketLoop {
             std::memmove(b.v, a.v + last_count_ * kRays, sizeof(Word) * kRays);
         };
         move(from.input, to.input), move(from.length, to.length);
-        for (int a = 0; a < 3; ++a) move(from.cell[a], to.cell[a]), move(from.weight[a], to.weight[a]);
         to.all_full = to.all_full && from.all_full;
+        for (int a = 0; a < 3; ++a) move(from.cell[a], to.cell[a]), move(from.weight[a], to.weight[a]);
         for (int a = 0; plan_.keeps_locations() && a < 3; ++a) move(from.location[a], to.location[a]);
         for (Batch& end : w_.end_gradients.component)
             if (plan_.shares_ends()) move(end, end);

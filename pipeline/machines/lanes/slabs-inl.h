@@ -29,9 +29,9 @@ struct Unseen {
         : left_out(plan.skips_empty_space),
           to(constant<L>(plan.unseen_to)),
           from(constant<L>(plan.unseen_from)) {}
-    bool holds(L front, L back) const {
-        return left_out && !any((to < max(front, back)) & (min(front, back) < from));
-    }
+    /// Where something may be seen, of slabs that may be left out.
+    auto seen(L front, L back) const { return (to < max(front, back)) & (min(front, back) < from); }
+    bool holds(L front, L back) const { return left_out && !any(seen(front, back)); }
 };
 
 template <class L>

@@ -72,6 +72,9 @@ inline std::vector<KernelCase> kernel_cases() {
             cases.push_back(kernel_case(name, std::move(settings), in_cells));
         };
         add("default", {unlit});
+        add("default, from 0 to 1 at once",
+            {unlit,
+             "transfer_function.points=[[0, 0, 0, 1, 0.1], [900, 0, 0, 1, 0.1], [901, 1, 0, 0, 0.1]]"});
         add("default, lit", {lit});
         add("default, lit, 8 bits, uneven voxels", {lit, "volume.bits=8", "volume.spacing=[1, 0.7, 1.6]"});
         add("16 bits, sobel, perspective",
@@ -158,7 +161,10 @@ class KernelChecker {
         if (kernels_.classify_composite)
             add(
                 "classify+composite", [this] { draw_rays(), draw_inputs(), draw_pixels(); },
-                [this] { kernels_.classify_composite(plan_, rays_, kSteps, *samples_, pixels_); },
+                [this] {
+                    kernels_.classify_composite(plan_, kernels_.unit_rows.data(), rays_, kSteps, *samples_,
+                                                pixels_);
+                },
                 [this] {
                     classify_as_the_model();
                     return composite_difference();
@@ -279,13 +285,13 @@ class KernelChecker {
             samples_->input.v[i] = static_cast<Word>(up_to(plan_.input.highest));
             samples_->length.v[i] = static_cast<Word>(below(3) == 0 ? up_to(full_length()) : full_length());
         }
+        samples_->all_full = false;
     }
     // Colours and opacities of slabs as classification leaves them: within 0 to 1, premultiplied ones no greater
     // than their opacity.
     void draw_slab(Word& alpha, Word* color0, Word* color1, Word* color2) {
         const CompositingStage& s = plan_.compositing;
         const Integer a = below(4) == 0 ? 0 : up_to(one(s.alpha_fraction));
-        samples_->all_full = false;
         alpha = static_cast<Word>(a);
         const int finer = s.color_fraction - s.alpha_fraction;
         const Integer most = !s.premultiplied ? one(s.color_fraction) : finer >= 0 ? a << finer : a >> -finer;
@@ -447,12 +453,6 @@ class KernelChecker {
         });
     }
     std::string locate_address_difference(int rows) {
-        if (auto text = locate_difference(rows); !text.empty()) return text;
-        before_ = *samples_;
-        kernels_.prefetch(c_.source, 0, rows, *samples_);
-        const auto place = [](const Samples& s, int i) {
-            return std::max(s.place.v[i], -1);
-        };  // none is none
         before_ = *samples_;
         if (!keeps_cells(plan_)) {
             kernels_.locate(plan_, rays_, 0, rows, *samples_);
@@ -462,6 +462,12 @@ class KernelChecker {
                 }
             std::swap(before_, *samples_);
         }
+        if (auto text = locate_difference(rows); !text.empty()) return text;
+        before_ = *samples_;
+        kernels_.prefetch(c_.source, 0, rows, *samples_);
+        const auto place = [](const Samples& s, int i) {
+            return std::max(s.place.v[i], -1);
+        };  // none is none
         return first_of(rows * kRays,
                         [&](int i) { return differs("place", i, place(*samples_, i), place(before_, i)); });
     }

@@ -97,6 +97,12 @@ TEST(Schedule, SaysWhichKernelItMissesAndWhy) {
                 ElementsAre("fetch: the volume lies as it is"));
     EXPECT_THAT(schedule_with({"shading.model=none", "compositing.form=alpha"}).missed,
                 ElementsAre(AllOf(HasSubstr("composite"), HasSubstr("form has another value"))));
+    EXPECT_THAT(
+        schedule_with(
+            {"shading.model=none",
+             "transfer_function.points=[[0, 0, 0, 1, 0.1], [900, 0, 0, 1, 0.1], [901, 1, 0, 0, 0.1]]"})
+            .missed,
+        ElementsAre("classify+composite.unit15: rows do not fit 16 bits"));
 }
 
 TEST(Schedule, AProjectionClassifiesNoSlab) {
