@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 
 namespace squint::lanes {
 namespace {
@@ -173,6 +174,82 @@ std::shared_ptr<BlockRanges> measure(const Volume& volume, const BlockBox& box) 
     return ranges;
 }
 
+/// Which ranges of scalars hold something to be seen.
+class SeenRanges {
+  public:
+    SeenRanges(const Entries& entries, std::uint16_t greatest, int entry_reach)
+        : before_from_(greatest + 1U), before_to_(greatest + 1U) {
+        // visible_before[i]: how many entries below i can be seen.
+        std::vector<int> visible_before(static_cast<std::size_t>(entries.size()) + 1, 0);
+        for (std::size_t i = 0; i < entries.entry.size(); ++i)
+            visible_before[i + 1] = visible_before[i] + entries.entry[i].is_visible();
+        // A sample's rounding may reach the next entry: one more on either side.
+        const int last = entries.size() - 1, more = 1 + entry_reach;
+        const auto entry_at = [&](double place) {
+            return static_cast<std::size_t>(std::clamp<double>(place, 0, last));
+        };
+        for (std::size_t scalar = 0; scalar <= greatest; ++scalar) {
+            const double entry = entries.coordinate(static_cast<double>(scalar));
+            before_from_[scalar] = visible_before[entry_at(std::floor(entry) - more)];
+            before_to_[scalar] = visible_before[entry_at(std::ceil(entry) + more) + 1];
+        }
+    }
+    bool operator()(std::size_t smallest, std::size_t largest) const {
+        return before_to_[largest] > before_from_[smallest];
+    }
+
+  private:
+    std::vector<int> before_from_, before_to_;  // visible entries that a range from or to a scalar may reach
+};
+
+/// Which blocks of half a side can be seen: a byte each, x fastest.
+template <class T>
+std::vector<std::uint8_t> seen_in_halves(const Volume& volume, const SeenRanges& can_be_seen,
+                                         const EmptySpace& space) {
+    constexpr std::int64_t kHalf = kBlock / 2;
+    const T* data = static_cast<const T*>(volume.data.get());
+    const Index3 &n = volume.dims, &low = space.box.low, &blocks = space.box.blocks;
+    std::vector<std::uint8_t> seen(static_cast<std::size_t>(8 * space.box.count()));
+    const auto look = [&](const Index3& block) {
+        // The voxels along x of each line, folded onto two halves; the middle one is in both.
+        std::int64_t at[3][kBlock + 1];
+        for (int a = 0; a < 3; ++a)
+            for (std::int64_t i = 0; i <= kBlock; ++i)
+                at[a][i] = std::min((low[a] + block[a]) * kBlock + i, n[a] - 1);
+        T least[2][2][2], most[2][2][2];
+        std::fill_n(&least[0][0][0], 8, std::numeric_limits<T>::max()), std::fill_n(&most[0][0][0], 8, T{0});
+        for (std::int64_t k = 0; k <= kBlock; ++k)
+            for (std::int64_t j = 0; j <= kBlock; ++j) {
+                const T* line = data + (at[2][k] * n.y + at[1][j]) * n.x;
+                T from[2], to[2];
+                for (int x = 0; x < 2; ++x) {
+                    const T a = line[at[0][kHalf * x]], b = line[at[0][kHalf * x + 1]],
+                            c = line[at[0][kHalf * x + 2]];
+                    from[x] = std::min(a, std::min(b, c)), to[x] = std::max(a, std::max(b, c));
+                }
+                for (int z = k > kHalf; z <= (k >= kHalf); ++z)
+                    for (int y = j > kHalf; y <= (j >= kHalf); ++y)
+                        for (int x = 0; x < 2; ++x) {
+                            least[z][y][x] = std::min(least[z][y][x], from[x]);
+                            most[z][y][x] = std::max(most[z][y][x], to[x]);
+                        }
+            }
+        for (int z = 0; z < 2; ++z)
+            for (int y = 0; y < 2; ++y)
+                for (int x = 0; x < 2; ++x)
+                    seen[static_cast<std::size_t>(
+                        ((2 * block.z + z) * 2 * blocks.y + 2 * block.y + y) * 2 * blocks.x + 2 * block.x +
+                        x)] = can_be_seen(least[z][y][x], most[z][y][x]);
+    };
+    tbb::parallel_for(std::int64_t{0}, blocks.z, [&](std::int64_t z) {
+        for (std::int64_t y = 0; y < blocks.y; ++y)
+            for (std::int64_t x = 0; x < blocks.x; ++x)
+                if (space.distance[static_cast<std::size_t>((z * blocks.y + y) * blocks.x + x)] == 0)
+                    look(Index3(x, y, z));
+    });
+    return seen;
+}
+
 }  // namespace
 
 bool BlockBox::holds(const BlockBox& other) const {
@@ -196,24 +273,9 @@ std::shared_ptr<const BlockRanges> block_ranges(const Volume& volume, const Bloc
 }
 
 EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, int reach, int entry_reach) {
-    // visible_before[i]: how many entries below i can be seen.
-    std::vector<int> visible_before(static_cast<std::size_t>(entries.size()) + 1, 0);
-    for (std::size_t i = 0; i < entries.entry.size(); ++i)
-        visible_before[i + 1] = visible_before[i] + entries.entry[i].is_visible();
-    // A sample's rounding may reach the next entry: one more on either side.
-    const int last = entries.size() - 1, more = 1 + entry_reach;
-    const auto entry_at = [&](double place) {
-        return static_cast<std::size_t>(std::clamp<double>(place, 0, last));
-    };
     std::uint16_t greatest = 0;
     for (const std::uint16_t scalar : ranges.largest) greatest = std::max(greatest, scalar);
-    // Counts the visible entries that a range of scalars may reach.
-    std::vector<int> before_from(greatest + 1U), before_to(greatest + 1U);
-    for (std::size_t scalar = 0; scalar <= greatest; ++scalar) {
-        const double entry = entries.coordinate(static_cast<double>(scalar));
-        before_from[scalar] = visible_before[entry_at(std::floor(entry) - more)];
-        before_to[scalar] = visible_before[entry_at(std::ceil(entry) + more) + 1];
-    }
+    const SeenRanges can_be_seen(entries, greatest, entry_reach);
 
     BlockRanges widened;
     if (reach > 0) widened = ranges;
@@ -228,7 +290,7 @@ EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, i
         std::int64_t here = 0;
         for (std::int64_t i = z * n.x * n.y; i < (z + 1) * n.x * n.y; ++i) {
             const auto at = static_cast<std::size_t>(i);
-            if (before_to[seen.largest[at]] > before_from[seen.smallest[at]]) space.distance[at] = 0, ++here;
+            if (can_be_seen(seen.smallest[at], seen.largest[at])) space.distance[at] = 0, ++here;
         }
         visible += here;
     });
@@ -237,6 +299,24 @@ EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, i
     clear_corners(space);
     find_spans(space);
     return space;
+}
+
+void look_again(const Volume& volume, const Entries& entries, EmptySpace& space) {
+    // Few enough that a new transfer function does not wait for them, and that caches hold their bits.
+    constexpr std::int64_t kMostVisible = 1 << 16;
+    if (space.visible_blocks > kMostVisible || space.box.count() > EmptySpace::kMostInHalves) return;
+    const SeenRanges can_be_seen(entries, static_cast<std::uint16_t>(volume.largest), 0);
+    std::vector<std::uint8_t> seen = volume.type == ScalarType::u8
+                                         ? seen_in_halves<std::uint8_t>(volume, can_be_seen, space)
+                                         : seen_in_halves<std::uint16_t>(volume, can_be_seen, space);
+    // Each with the next, axis by axis; a block past the end of a line is the next line's, and does no harm.
+    const Index3& n = space.box.blocks;
+    for (const std::int64_t stride : {std::int64_t{1}, 2 * n.x, 4 * n.x * n.y})
+        for (std::size_t i = 0, next = static_cast<std::size_t>(stride); next < seen.size(); ++i, ++next)
+            seen[i] |= seen[next];
+    space.fine.assign((seen.size() + 31) / 32, 0);
+    for (std::size_t i = 0; i < seen.size(); ++i)
+        space.fine[i / 32] |= static_cast<std::uint32_t>(seen[i]) << i % 32;
 }
 
 }  // namespace squint::lanes

@@ -40,17 +40,25 @@ struct EmptySpace {
     // seen.
     std::vector<std::uint8_t> spans;
     std::int64_t visible_blocks = 0;
+    // A second look, at blocks of half that side, x fastest: bit i % 32 of word i / 32 says whether one of the
+    // 2 x 2 x 2 from block i on can be seen.  Empty where there was none.
+    std::vector<std::uint32_t> fine;
     std::uint8_t at(std::int64_t x, std::int64_t y, std::int64_t z) const {
         const Index3 &low = box.low, &n = box.blocks;
         return distance[static_cast<std::size_t>(((z - low.z) * n.y + y - low.y) * n.x + x - low.x)];
     }
     /// About how many bytes ranges and distances of these blocks take.
-    static std::int64_t bytes_for(const BlockBox& box) { return 7 * box.count(); }
+    static std::int64_t bytes_for(const BlockBox& box) {
+        return (box.count() <= kMostInHalves ? 8 : 7) * box.count();
+    }
+    static constexpr std::int64_t kMostInHalves = 1 << 19;  // blocks that may be looked at again
 };
 
 /// `reach`: how many blocks apart two neighbouring samples may be, where the method sees the range between
 /// them; else 0.  `entry_reach`: how many entries beside a slab's own its colour may depend on.
 EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, int reach,
                             int entry_reach = 0);
+/// Finds EmptySpace::fine, of samples that are classified each for itself.
+void look_again(const Volume& volume, const Entries& entries, EmptySpace& space);
 
 }  // namespace squint::lanes

@@ -38,7 +38,9 @@ std::shared_ptr<const EmptySpace> kept_empty_space(const Volume& volume, const B
         const auto find = [&](const BlockRanges& r) {
             return find_empty_space(r, entries, reach, entry_reach);
         };
-        return std::make_shared<Keyed>(Keyed{key, from_zero ? find(lowered(*ranges)) : find(*ranges)});
+        auto keyed = std::make_shared<Keyed>(Keyed{key, from_zero ? find(lowered(*ranges)) : find(*ranges)});
+        if (reach == 0 && entry_reach == 0 && !from_zero) look_again(volume, entries, keyed->space);
+        return keyed;
     };
     const std::shared_ptr<Keyed> found = kept.find_or_make(
         volume, make, [&](const Keyed& k) { return k.key == key && k.space.box.holds(box); });

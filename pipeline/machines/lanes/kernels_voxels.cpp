@@ -429,6 +429,41 @@ std::uint32_t seen_within(const lanes::EmptySpace& empty, const lanes::RayCourse
     return seen;
 }
 
+/// The same of blocks of half a side, for rows whose samples lie in at most two of them along each axis.
+template <class At>
+std::uint32_t seen_in_fine(const lanes::EmptySpace& empty, const lanes::RayCourse& course, At&& at) {
+    const hn::ScalableTag<float> df;
+    const hn::ScalableTag<Word> d;
+    const Index3& blocks = empty.box.blocks;
+    const auto apart = hn::Set(df, 2 * course.apart);
+    const auto one = hn::Set(d, 1);
+    std::uint32_t seen = 0;
+    for (int lane = 0; lane < lanes::RayCourse::kWindow; lane += kLanes) {
+        const auto row = at(lane);
+        auto here = hn::Zero(d);
+        for (int beam = 0; beam < course.beams; ++beam) {
+            auto index = hn::Zero(d);
+            for (int a = 2; a >= 0; --a) {
+                const auto p = hn::MulAdd(row, hn::Set(df, 2 * course.step[beam][a]),
+                                          hn::Set(df, 2 * course.first[beam][a]));
+                const auto inside = hn::Min(hn::Max(hn::Sub(p, apart), hn::Zero(df)),
+                                            hn::Set(df, static_cast<float>(2 * blocks[a] - 1)));
+                // Floors, for no place is below zero.
+                index = hn::Add(hn::Mul(index, hn::Set(d, static_cast<Word>(2 * blocks[a]))),
+                                hn::ConvertTo(d, inside));
+            }
+            const auto bits = hn::GatherIndex(d, reinterpret_cast<const Word*>(empty.fine.data()),
+                                              hn::ShiftRight<5>(index));
+            const auto bit = hn::Shl(one, hn::And(index, hn::Set(d, 31)));
+            here = hn::Or(here, hn::And(bits, bit));
+        }
+        std::uint8_t bits[8] = {};
+        hn::StoreMaskBits(d, hn::Ne(here, hn::Zero(d)), bits);
+        seen |= static_cast<std::uint32_t>(bits[0] | bits[1] << 8) << lane;
+    }
+    return seen;
+}
+
 lanes::Rows visible_rows_of(const lanes::EmptySpace& empty, const lanes::RayPacket& rays, int k,
                             lanes::RayCourse& course) {
     constexpr int kWindow = lanes::RayCourse::kWindow;
@@ -439,10 +474,12 @@ lanes::Rows visible_rows_of(const lanes::EmptySpace& empty, const lanes::RayPack
                               hn::Set(df, static_cast<float>(first) + begin));
         };
     };
+    const bool fine = !empty.fine.empty() && course.apart >= 0 && course.apart <= 0.25F;
     while (k < rays.most_slabs) {
         if (k + lanes::kSteps > course.window + kWindow) {
             course.window = k;
-            course.may_be_seen = course.apart >= 0
+            course.may_be_seen = fine ? seen_in_fine(empty, course, rows_from(k, 1, 0))
+                                 : course.apart >= 0
                                      ? seen_within(empty, course, rows_from(k, 1, 0))
                                      : seen_about(empty, course, course.enough, rows_from(k, 1, 0));
         }

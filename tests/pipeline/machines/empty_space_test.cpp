@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <memory>
 #include <random>
 
 namespace squint::lanes {
@@ -77,6 +78,41 @@ TEST(EmptySpace, ASpanIsSeenWhereOneOfItsBlocksIs) {
                             });
                         ASSERT_EQ((drawn.space.spans[i] >> span & 1) != 0, seen);
                     }
+    }
+}
+
+TEST(EmptySpace, ASecondLookFindsTheBlocksOfTwoCellsThatCanBeSeen) {
+    std::mt19937 random(5);
+    const auto between = [&](int low, int high) { return std::uniform_int_distribution(low, high)(random); };
+    Entries entries;  // nothing is seen below 100
+    entries.entry.resize(256);
+    for (std::size_t i = 100; i < 256; ++i) entries.entry[i].extinction = 1;
+    for (int round = 0; round < 60; ++round) {
+        auto voxels = std::make_shared<std::vector<std::uint8_t>>();
+        Volume volume;
+        volume.dims = {between(2, 19), between(2, 19), between(2, 19)};
+        volume.type = ScalarType::u8, volume.largest = 200;
+        voxels->assign(static_cast<std::size_t>(volume.voxels()), 0);
+        for (int i = between(0, 3); i > 0; --i)
+            (*voxels)[static_cast<std::size_t>(between(0, static_cast<int>(volume.voxels()) - 1))] = 200;
+        volume.data = std::shared_ptr<const void>(voxels, voxels->data());
+        EmptySpace space = find_empty_space(*block_ranges(volume, all_blocks_of(volume)), entries, 0);
+        look_again(volume, entries, space);
+        const Index3 n = volume.dims, blocks = space.box.blocks + space.box.blocks;
+        const auto bright = [&](const Index3& low, const Index3& high) {  // cells between, both ends
+            for (auto z = low.z; z <= std::min(high.z + 1, n.z - 1); ++z)
+                for (auto y = low.y; y <= std::min(high.y + 1, n.y - 1); ++y)
+                    for (auto x = low.x; x <= std::min(high.x + 1, n.x - 1); ++x)
+                        if ((*voxels)[static_cast<std::size_t>((z * n.y + y) * n.x + x)] > 0) return true;
+            return false;
+        };
+        for (std::int64_t z = 0; z + 1 < blocks.z; ++z)
+            for (std::int64_t y = 0; y + 1 < blocks.y; ++y)
+                for (std::int64_t x = 0; x + 1 < blocks.x; ++x) {
+                    const auto i = static_cast<std::size_t>((z * blocks.y + y) * blocks.x + x);
+                    const Index3 low(2 * x, 2 * y, 2 * z);
+                    ASSERT_EQ((space.fine[i / 32] >> i % 32 & 1) != 0, bright(low, low + Index3(3)));
+                }
     }
 }
 
