@@ -9,6 +9,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -68,13 +69,24 @@ bool may_be_met(const BlockBox& box, const EmptySpace* empty, const Index3& cell
     return false;
 }
 
+double samples_of(const Plan& plan) {
+    const Index3& n = plan.volume->dims;
+    return static_cast<double>(plan.camera.width) * plan.camera.height *
+           static_cast<double>(std::max({n.x, n.y, n.z})) / plan.scene.sampling.step;
+}
+
 // Whether cells pay: where a block is met by many more samples than it takes voxels to build.
-bool cells_pay(const Plan& plan) {
-    const Volume& volume = *plan.volume;
-    const double samples = static_cast<double>(plan.camera.width) * plan.camera.height *
-                           static_cast<double>(std::max({volume.dims.x, volume.dims.y, volume.dims.z})) /
-                           plan.scene.sampling.step;
+bool cells_pay(const Volume& volume, double samples) {
     return samples >= 8 * static_cast<double>(volume.voxels());
+}
+
+// The samples of all pictures of a volume so far and of this one: cells last as long as its voxels.
+double samples_so_far(const Plan& plan) {
+    static KeptPerVolume<std::atomic<double>> kept;
+    const auto taken = kept.find(
+        *plan.volume, [] { return std::make_shared<std::atomic<double>>(0); },
+        [](const auto&) { return true; });
+    return *taken += samples_of(plan);
 }
 
 // Whether a packet spans so many voxels that its outermost rays' cells do not stand for the others'.
@@ -254,6 +266,7 @@ void LaneRenderer::choose_layout(const RenderOptions& options) {
     if (cells_->room() > 0) {
         build_cells(cells_, volume, blocks_met(plan_), empty_);
         voxels_.cells = cells_->data(), voxels_.blocks = cells_->blocks(), voxels_.slots = cells_->slots();
+        voxels_.near = cells_->near();
         voxels_.requests_all = rays_lie_apart(plan_);
     }
     layout_ = fmt::format("cells: 2x2x2 voxels side by side, {:.1f} MiB if all were met, room for {:.1f} MiB",
@@ -266,7 +279,6 @@ std::string words_of(const Plan& plan) {
     if (plan.float32) return "float32 lanes";
     const StageWays ways = ways_of(plan);
     if (plan.projection_mode)
-        voxels_.near = cells_->near();
         return fmt::format("lanes of {}/{} bits (location, interpolation), one classification a ray",
                            ways.location.bits, ways.interpolation.bits);
     std::string text = fmt::format(
@@ -288,7 +300,7 @@ std::string words_in_lanes(const Plan& plan) {
     static constexpr std::uint8_t kSomewhere = 0;
     VoxelSource source;
     source.volume = plan.volume.get();
-    source.cells = cells_pay(plan) ? &kSomewhere : nullptr;
+    source.cells = cells_pay(*plan.volume, samples_of(plan)) ? &kSomewhere : nullptr;
     return words_and_schedule(plan,
                               schedule_of(plan, kernels_for(plan, ways_of(plan), source, find_target(""))));
 }
