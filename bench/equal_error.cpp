@@ -4,10 +4,12 @@
 // bench/tables.py equal-error makes a table of it, bench/plots.py draws it.
 //
 //     bench_equal_error [scenes=phantom_128,cthead_translucent,head,figure_5,...] [lit=0] [threads=1]
-//                       [size=800] [every=8] [repeats=3] [coarsest=4] [finest=0.03125] [all=0]
+//                       [contenders=vtk,pc,pi2d,mean,...] [size=800] [every=8] [repeats=3] [coarsest=4]
+//                       [finest=0.03125] [all=0]
 //
 // Scenes: phantom_SIZE, those of configs/bench by name, figure_N of configs/lee_shin, and `head`, which is
-// built in.  all=1: every step down to the finest, also past 50 dB.
+// built in.  Contenders: the methods by default, each with its own light; mean, middle, two_point and adaptive are
+// PIPS(1) with that rule for light inside a slab.  all=1: every step down to the finest, also past 50 dB.
 #include "bench/support/support.h"
 #include "core/error.h"
 #ifdef SQUINT_HAS_VTK
@@ -45,8 +47,25 @@ const std::vector<Contender>& contenders() {
         {"pips_3", {"classification.method=pips", "classification.order=3"}},
         {"leg_2", {"classification.method=leg", "classification.order=2"}},
         {"leg_3", {"classification.method=leg", "classification.order=3"}},
+        {"mean", {"classification.method=pips", "shading.inside=mean"}},
+        {"middle", {"classification.method=pips", "shading.inside=middle"}},
+        {"two_point", {"classification.method=pips", "shading.inside=two_point"}},
+        {"adaptive", {"classification.method=pips", "shading.inside=adaptive"}},
     };
     return all;
+}
+/// Those with these names, in this order; VTK only where it was built.
+std::vector<Contender> contenders(const std::vector<std::string>& names) {
+    std::vector<Contender> chosen;
+    for (const std::string& name : names) {
+        const auto found = std::find_if(contenders().begin(), contenders().end(),
+                                        [&](const Contender& c) { return c.name == name; });
+        if (found != contenders().end())
+            chosen.push_back(*found);
+        else if (name != "vtk")
+            throw InputError(fmt::format("contenders: there is no \"{}\"", name));
+    }
+    return chosen;
 }
 
 struct Point {
@@ -155,6 +174,7 @@ int main(int argc, char** argv) try {
                                  "opaque,engine_translucent,aneurism_opaque"
                                : "phantom_128"},
          {"lit", "0"},
+         {"contenders", "vtk,pc,pc_mid,pi2d,pi1d,pi1d_engel,pips_1,pips_3,leg_2,leg_3"},
          {"threads", "1"},
          {"size", "800"},
          {"every", "8"},
@@ -166,7 +186,7 @@ int main(int argc, char** argv) try {
     for (const std::string& name : settings.list("scenes"))
         for (const double lit : settings.numbers("lit")) {
             Json scene{{"scene", name}, {"lit", lit != 0}, {"contenders", Json::array()}};
-            for (const Contender& contender : contenders()) try {
+            for (const Contender& contender : contenders(settings.list("contenders"))) try {
                     scene["contenders"].push_back(run(name, lit != 0, contender, settings));
                 } catch (const InputError& error) {
                     std::fputs(fmt::format("{}: left out: {}\n", contender.name, error.what()).c_str(),
