@@ -75,18 +75,20 @@ double samples_of(const Plan& plan) {
            static_cast<double>(std::max({n.x, n.y, n.z})) / plan.scene.sampling.step;
 }
 
-// Whether cells pay: where a block is met by many more samples than it takes voxels to build.
-bool cells_pay(const Volume& volume, double samples) {
-    return samples >= 8 * static_cast<double>(volume.voxels());
+// Whether cells pay within one picture: where a block is met by many more samples than it takes voxels to build.
+bool cells_pay(const Plan& plan) {
+    return samples_of(plan) >= 8 * static_cast<double>(plan.volume->voxels());
 }
 
-// The samples of all pictures of a volume so far and of this one: cells last as long as its voxels.
-double samples_so_far(const Plan& plan) {
+// Or over all pictures of a volume so far, for cells last as long as its voxels: where they would have saved by
+// now what they cost.  Light takes most of its time elsewhere.
+bool cells_pay_by_now(const Plan& plan) {
+    if (plan.lit) return false;
     static KeptPerVolume<std::atomic<double>> kept;
     const auto taken = kept.find(
         *plan.volume, [] { return std::make_shared<std::atomic<double>>(0); },
         [](const auto&) { return true; });
-    return *taken += samples_of(plan);
+    return (*taken += samples_of(plan)) >= 80 * static_cast<double>(plan.volume->voxels());
 }
 
 // Whether a packet spans so many voxels that its outermost rays' cells do not stand for the others'.
@@ -256,8 +258,7 @@ void LaneRenderer::choose_layout(const RenderOptions& options) {
         layout_ = "linear: as asked";
         return;
     }
-    if (const double samples = samples_so_far(plan_);
-        options.layout == LayoutRule::automatic && !cells_pay(volume, samples)) {
+    if (options.layout == LayoutRule::automatic && !cells_pay(plan_) && !cells_pay_by_now(plan_)) {
         layout_ = "linear: too few samples so far for cells to pay";
         return;
     }
@@ -300,7 +301,7 @@ std::string words_in_lanes(const Plan& plan) {
     static constexpr std::uint8_t kSomewhere = 0;
     VoxelSource source;
     source.volume = plan.volume.get();
-    source.cells = cells_pay(*plan.volume, samples_of(plan)) ? &kSomewhere : nullptr;
+    source.cells = cells_pay(plan) ? &kSomewhere : nullptr;
     return words_and_schedule(plan,
                               schedule_of(plan, kernels_for(plan, ways_of(plan), source, find_target(""))));
 }
