@@ -115,24 +115,18 @@ inline Bounded voxel_difference(const GradientStage& s, const HWY_NAMESPACE::Nei
     const DifferenceField field(*near.volume, s.rule, axis);
     const int bits = s.weight_bits;
     // Between the differences at the cell's corners; analytic has no lerp along the axis itself.
-    std::array<long double, 8> at{};
+    std::array<std::int64_t, 8> at{};
     for (std::size_t i = 0; i < 8; ++i) {
         std::array<std::int64_t, 3> place = near.cell;
         for (std::size_t a = 0; a < 3; ++a)
             if (!(field.is_edge() && static_cast<int>(a) == axis)) place[a] += (i >> a) & 1;
-        at[i] = static_cast<long double>(field.at(place));
+        at[i] = static_cast<std::int64_t>(field.at(place));
     }
-    const auto lerp = [&](long double a, long double b, std::size_t along) {
-        return a == b ? a : a + std::ldexp(static_cast<long double>(weight[along].v), -bits) * (b - a);
-    };
-    const long double z0 = lerp(lerp(at[0], at[1], 0), lerp(at[2], at[3], 0), 1),
-                      z1 = lerp(lerp(at[4], at[5], 0), lerp(at[6], at[7], 0), 1), between = lerp(z0, z1, 2);
+    const BetweenCorners between(at, weight, bits);
     const int first = bits - s.to_first.shift,
               second = field.is_edge() ? first : first + bits - s.to_second.shift,
               fraction = second + bits - s.to_gradient.shift;
-    const long double exact = std::ldexp(between, fraction);
-    auto taken = static_cast<double>(std::abs(static_cast<long double>(word) - exact));
-    if (taken > 0) taken += static_cast<double>(std::abs(exact)) * 0x1p-58;  // long doubles have 64 bits
+    const double taken = between.from(word, fraction);
     const auto of_level = [&](const Rescale& to, int bits_after) {
         return unit_of(to) * std::ldexp(1.0, fraction - bits_after);
     };
@@ -148,7 +142,7 @@ inline Bounded voxel_difference(const GradientStage& s, const HWY_NAMESPACE::Nei
     double all = 0;
     for (const Bounded& w : weight) all += w.most();
     if (field.is_edge() && !cells.is_one()) {
-        const double off = field.from(static_cast<double>(between), cells) * one;
+        const double off = field.from(between.value(), cells) * one;
         for (const Bounded& w : weight)
             if (!w.exact && off > 0) error.add(w.error, off / all);
         return with_error(word, error);

@@ -4,6 +4,11 @@
 #include "fixedpoint/words/bounded.h"
 #include "scene/wires.h"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <initializer_list>
 #include <utility>
 
@@ -27,5 +32,38 @@ inline void add_local(Shares& shares, double known, std::initializer_list<std::p
     for (const auto& [who, error] : usual) shares[last = who] += error, left -= error;
     if (left > 0) shares[last] += left;
 }
+
+/// The number between eight corners, in integers: a whole one has 2^bits units.
+class BetweenCorners {
+  public:
+    /// Of weights of `weight_bits` fraction bits; those above 34 are dropped.
+    BetweenCorners(const std::array<std::int64_t, 8>& corner, const std::array<Bounded, 3>& weight,
+                   int weight_bits) {
+        const int dropped = std::max(weight_bits - 34, 0), bits = weight_bits - dropped;
+        std::array<Int128, 8> at{};
+        std::int64_t most = 0;
+        for (std::size_t i = 0; i < 8; ++i) {
+            at[i] = corner[i];
+            most = std::max(most, corner[i] < 0 ? -corner[i] : corner[i]);
+        }
+        for (std::size_t axis = 0, n = 4; axis < 3; ++axis, n /= 2)
+            for (std::size_t i = 0; i < n; ++i)
+                at[i] = (at[2 * i] << bits) + (weight[axis].v >> dropped) * (at[2 * i + 1] - at[2 * i]);
+        value_ = at[0], bits_ = 3 * bits;
+        slack_ = dropped > 0 ? std::ldexp(static_cast<double>(most), 3 - bits) : 0;
+    }
+    double value() const { return std::ldexp(in_double(value_), -bits_); }
+    /// How far a word with `fraction` fraction bits is from it, in the word's last bits.
+    double from(Int128 word, int fraction) const {
+        const int more = bits_ - fraction;
+        const Int128 off = more >= 0 ? value_ - (word << more) : (value_ << -more) - word;
+        return std::ldexp(in_double(absolute(off)), -std::max(more, 0)) + std::ldexp(slack_, fraction);
+    }
+
+  private:
+    Int128 value_ = 0;
+    int bits_ = 0;
+    double slack_ = 0;
+};
 
 }  // namespace squint

@@ -130,16 +130,9 @@ inline Bounded interpolate(const InterpolationStage& s, const BoundedCell& cell,
     if (s.nearest) return nearest_of(s, cell, weight, word);
     // What the three levels have taken: none of them can be told from the others.
     const int bits = s.weight_bits;
-    const long double part = std::ldexp(1.0L, -bits);
-    const auto lerp = [&](long double a, long double b, std::size_t axis) {
-        return a == b ? a : a + static_cast<long double>(weight[axis].v) * part * (b - a);
-    };
-    const auto at = [&](int i) { return static_cast<long double>(cell.corners.at(i)); };
-    const long double z0 = lerp(lerp(at(0), at(1), 0), lerp(at(2), at(3), 0), 1);
-    const long double z1 = lerp(lerp(at(4), at(5), 0), lerp(at(6), at(7), 0), 1);
-    const long double exact = std::ldexp(lerp(z0, z1, 2), s.sample_fraction);
-    auto taken = static_cast<double>(std::abs(static_cast<long double>(word) - exact));
-    if (taken > 0) taken += static_cast<double>(exact) * 0x1p-58;  // long doubles have 64 bits
+    std::array<std::int64_t, 8> corner{};
+    for (std::size_t i = 0; i < 8; ++i) corner[i] = static_cast<std::int64_t>(cell.corners.corner[i]);
+    const double taken = BetweenCorners(corner, weight, bits).from(word, s.sample_fraction);
     Shares error;
     const double one = std::ldexp(1.0, s.sample_fraction);
     const auto of_level = [&](const Rescale& to, int bits_after) {
