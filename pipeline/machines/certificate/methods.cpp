@@ -98,7 +98,7 @@ SeriesKernel series_kernel(int order, bool legendre) {
     using preintegration::legendre_split_depth;
     using preintegration::trusted_depth;
     // Greatest values over [0, trusted_depth] and [0, legendre_split_depth], rounded up.
-    constexpr double kPips[][3] = {{2, 2, 4}, {1.5, 3, 2.7}, {2.1, 3.2, 4.3}, {2.5, 11, 8.3}};
+    constexpr double kPips[][3] = {{2, 2, 2}, {1.6, 3, 1.13}, {2.07, 3.1, 1.22}, {2.5, 11, 2.4}};
     constexpr double kLeg[][3] = {{1.8, 1.5, 0.5}, {2, 2.7, 0.8}, {2.8, 6.5, 1.2}};
     if (order == 1) return {};
     const auto& of = legendre ? kLeg[order - 2] : kPips[order - 2];
