@@ -108,6 +108,20 @@ struct FromVolume {
     }
 };
 
+/// One where the cell at a position holds a wall, else zero.
+template <class Voxels, class W>
+HWY_INLINE W nears_wall(const Voxels& voxels, const WallStage& walls, const CellPosition<W>& at) {
+    return voxels.nears_wall(walls, at.cell);
+}
+/// A slab that was looked at twice, or the same at one look.
+template <class W, class Mask>
+HWY_INLINE Slab<W> either(const Mask& twice, const Slab<W>& looked, const Slab<W>& once) {
+    Slab<W> slab;
+    for (std::size_t c = 0; c < 3; ++c) slab.color[c] = select(twice, looked.color[c], once.color[c]);
+    slab.alpha = select(twice, looked.alpha, once.alpha);
+    return slab;
+}
+
 /// Stage 3: a raw gradient turned from the mean of those about its place.
 template <class W, class Voxels>
 std::array<W, 3> exaggerated_gradient(const Plan& plan, const Voxels& voxels, const std::array<W, 3>& cell,
@@ -346,9 +360,7 @@ class Slabs : public Places<W, Voxels, Observer> {
         const bool looks = plan_.walls.looks_twice && any(zero < twice);
         const Slab<W> looked = looks ? look_twice(front, back, length) : slab;
         if (plan_.lit && any((zero < slab.alpha) & (twice == zero))) light(front, back, length, slab);
-        for (std::size_t c = 0; c < 3; ++c)
-            slab.color[c] = select(zero < twice, looked.color[c], slab.color[c]);
-        slab.alpha = select(zero < twice, looked.alpha, slab.alpha);
+        slab = either(zero < twice, looked, slab);
         observer_.at(Part::compositing);
         const Accumulated<W> before = pixel;
         composite(plan_.compositing, pixel, slab.color, slab.alpha);
@@ -360,7 +372,7 @@ class Slabs : public Places<W, Voxels, Observer> {
         const W zero = constant<W>(0);
         const auto open = slab.alpha < constant<W>(plan_.inside.one_alpha);
         if (!any(open)) return zero;
-        const auto near = [&](const CellPosition<W>& p) { return voxels_.nears_wall(plan_.walls, p.cell); };
+        const auto near = [&](const CellPosition<W>& p) { return nears_wall(voxels_, plan_.walls, p); };
         W wall = max(near(front.position), near(back.position));
         if (any(wall == zero)) {
             observer_.at(Part::location);

@@ -35,7 +35,7 @@ template <class M>
 void certify_row(const Plan& plan, const M& bounded_method, int row, const CertificateOptions& options,
                  Image* image, Row& to) {
     const int every = std::max(options.every, 1);
-    const BoundedVolume voxels{*plan.volume};
+    const BoundedVolume voxels{*plan.volume, plan.interpolation.weight_bits};
     BoundedRay ray(plan);
     for (int column = 0; column < plan.camera.width; column += every) {
         const RaySetup setup = plan.set_up(column, row);
@@ -142,19 +142,22 @@ std::optional<std::string> what_is_not_bounded(const Plan& plan) {
     if (plan.scene.classification.as_printed)
         return "classification.as_printed is not bounded; allowed: false";
     const WallRule walls = plan.scene.classification.opaque_prediction;
-    if (plan.walls.looks_twice || (!std::holds_alternative<PostClassification>(plan.method) &&
-                                   plan.entries.any_opaque() && walls == WallRule::none))
+    if (!std::holds_alternative<PostClassification>(plan.method) && plan.entries.any_opaque() &&
+        walls == WallRule::none)
         return fmt::format(
-            "opaque entries with classification.opaque_prediction {} are not bounded yet; allowed: ends",
+            "opaque entries with classification.opaque_prediction {} are not bounded yet; "
+            "allowed: ends, twice",
             name_of(walls));
     if (!plan.lit) return {};
     if (plan.gradient.rule == GradientRule::cubic_spline)
         return "shading.gradient cubic_spline is not bounded yet; allowed: central, central_samples, "
                "analytic, sobel";
     if (plan.gradient.exaggerated.wanted) return "shading.exaggeration is not bounded yet; allowed: 0";
-    if (lights_fade(plan.inside.rule) || lights_at_places(plan.inside.rule))
-        return fmt::format("shading.inside {} is not bounded yet; allowed: mean, front, middle, adaptive",
-                           name_of(plan.inside.rule));
+    if (lights_fade(plan.inside.rule) && std::holds_alternative<PreIntegrated2D>(plan.method))
+        return fmt::format(
+            "shading.inside {} is not bounded yet for classification.method {}; allowed: mean, "
+            "front, middle, centroid, two_point, adaptive",
+            name_of(plan.inside.rule), name_of(plan.scene.classification.method));
     if (plan.inside.rule == InsideRule::adaptive && plan.inside.one_alpha < 1 << 15)
         return "shading.inside adaptive cuts other slabs where precision.slab_alpha has few bits; allowed: "
                "15 or more fraction bits";
@@ -183,15 +186,19 @@ Certificate certify(const Plan& plan, const CertificateOptions& options) {
             });
         });
     };
+    const Plan real = std::holds_alternative<PostClassification>(plan.method) ? plan : real_plan(plan);
+    const auto prefix_of = [&](const auto& words) {
+        return BoundedPrefix{words.prefix, real.inside, function};
+    };
     if (const auto* words = std::get_if<PostClassification>(&plan.method)) {
         certify_all(BoundedPostClassification{*words, function});
     } else if (const auto* cells = std::get_if<PreIntegrated2D>(&plan.method)) {
-        const Plan real = real_plan(plan);
-        certify_all(BoundedCells{*cells, std::get<PreIntegrated2D>(real.method), function});
+        certify_all(
+            BoundedCells{*cells, std::get<PreIntegrated2D>(real.method), function, prefix_of(*cells)});
     } else if (const auto* means = std::get_if<PreIntegrated1D>(&plan.method)) {
-        const Plan real = real_plan(plan);
         const Function of_means = Function::of_means(plan, means->is_opacity);
-        certify_all(BoundedMeans{*means, std::get<PreIntegrated1D>(real.method), function, of_means});
+        certify_all(BoundedMeans{*means, std::get<PreIntegrated1D>(real.method), function, of_means,
+                                 prefix_of(*means)});
     } else {
         const bool legendre = plan.scene.classification.method == Method::leg;
         const auto* first = std::get_if<PowerSeriesOfOrder1>(&plan.method);
@@ -199,9 +206,11 @@ Certificate certify(const Plan& plan, const CertificateOptions& options) {
         preintegration::ExactSeries exact = preintegration::build_exact_series(
             plan.entries, order, legendre, plan.scene.classification.opaque_prediction != WallRule::none);
         exact.step = full_step(plan);
-        BoundedPowerSeries series{first, function, exact, series_kernel(order, legendre)};
-        if (!first) series.words = &std::get<MomentSeries>(plan.method);
-        certify_all(series);
+        const auto series = [&](const auto& words) {
+            return BoundedPowerSeries{&words, function, exact, series_kernel(order, legendre),
+                                      prefix_of(words)};
+        };
+        certify_all(first ? series(*first) : series(std::get<MomentSeries>(plan.method)));
     }
     if (stopped) throw Cancelled{};
     std::vector<float> most;

@@ -14,6 +14,8 @@
 
 #include <hwy/highway.h>
 
+#include <type_traits>
+
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
@@ -109,6 +111,8 @@ HWY_INLINE std::array<W, 3> gradient_up_to(const InsideStage& s, const std::arra
 template <class W>
 HWY_INLINE W depth_up_to_wall(const PrefixLookup& p, const CutSlab<W>& cut, const Wide<W>& difference,
                               W length) {
+    if constexpr (std::is_same_v<W, Real<double>>)
+        if (!p.depth.active && !(cut.span == constant<W>(0))) return exact_depth(p, cut, length);
     W depth = depth_of(p, difference, widen(divisor<W>(cut.span)), length);
     const auto point = cut.span == constant<W>(0);
     if (any(point)) depth = select(point, point_depth(p.entries, cut.front, length), depth);
@@ -212,6 +216,24 @@ HWY_INLINE std::array<W, 3> light_of_places(const InsideStage& s, const std::arr
     });
     return color;
 }
+/// How the light of a slab between two inputs, or of its part before a wall, leans to its front, as even matter's.
+template <class W>
+HWY_INLINE W lean_between(const InsideStage& s, const PrefixLookup& p, W near, W far, W length) {
+    const CutSlab<W> part = cut_at_wall(p, near, far);
+    const auto row_at = [&](W input) { return sub_entry_position(p.entries, p.sub_entry_bits, input); };
+    const W depth = depth_up_to_wall(p, part, depth_between(p, row_at(near), row_at(part.end_input)), length);
+    return even_matter(s.even, depth, 0);
+}
+/// The lesser of what is not negative and a limit.
+template <class W>
+HWY_INLINE W at_most(W x, std::int64_t limit) {
+    return min(x, constant<W>(limit));
+}
+/// What a part of the quarters' colour is of the slab's.
+template <class W>
+HWY_INLINE W part_of_color(const InsideStage& s, W part, W color, W quarters_color) {
+    return divide(part * color, divisor<W>(quarters_color), s.to_scaled);
+}
 /// Where light lies in a slab of a method that classifies parts of slabs: in its quarters, each of even matter.  A
 /// quarter's share of the light is what is seen of it; beside the slab's colour that of all quarters counts alone.
 /// Parts are straight: they sum to the slab's colour, and white to one.  A wall's light lies at its place.
@@ -222,9 +244,8 @@ HWY_INLINE FadingLight<W> fading_light_of_quarters(const InsideStage& s, const M
     const Quarters& quarters = s.rule == InsideRule::linear ? kLinear : kCubic;
     const auto count = s.rule == InsideRule::linear ? std::size_t{2} : std::size_t{4};
     constexpr std::int64_t kOne = std::int64_t{1} << kShareBits;
-    const PrefixLookup& p = m.prefix;
     const W zero = constant<W>(0), one = constant<W>(s.one_color);
-    const CutSlab<W> cut = cut_at_wall(p, front, back);
+    const CutSlab<W> cut = cut_at_wall(m.prefix, front, back);
     const auto has_wall = zero < cut.wall;
     FadingLight<W> light{static_cast<int>(count), {}, way_to_wall(cut, s.to_way)};
     W whole_length = length;
@@ -236,24 +257,20 @@ HWY_INLINE FadingLight<W> fading_light_of_quarters(const InsideStage& s, const M
     W through = constant<W>(s.one_alpha), near = cut.front_input, near_length = zero;
     for (int i = 1; i <= kQuarters; ++i) {
         const auto at = static_cast<std::size_t>(i - 1);
-        const W far = input_between(s, cut.front_input, cut.end_input, i, 2);
+        const W far = i == kQuarters ? cut.end_input : input_between(s, cut.front_input, cut.end_input, i, 2);
         const W far_length = i == kQuarters ? whole_length : length_up_to(s, whole_length, i, 2);
         const W part_length = within(far_length - near_length, 0, s.full_length);
         quarter[at] = classify(m, near, far, part_length);
-        const CutSlab<W> part = cut_at_wall(p, near, far);
-        const auto row_at = [&](W input) { return sub_entry_position(p.entries, p.sub_entry_bits, input); };
-        const W depth =
-            depth_up_to_wall(p, part, depth_between(p, row_at(near), row_at(part.end_input)), part_length);
-        lean[at] = even_matter(s.even, depth, 0);
+        lean[at] = lean_between(s, m.prefix, near, far, part_length);
         seen[at] = min(quantise(through * quarter[at].alpha, s.to_part), through);
         through = within(through - seen[at], 0, s.one_alpha);
         near = far, near_length = far_length;
     }
-    const W all = max(constant<W>(s.one_alpha) - through, constant<W>(1));
+    const W all = divisor<W>(constant<W>(s.one_alpha) - through);
     std::array<std::array<W, 4>, 4> sum{};
     for (auto& part : sum) part.fill(zero);
     for (std::size_t i = 0; i < kQuarters; ++i) {
-        const W share = min(quotient(seen[i], all, s.to_share), constant<W>(kOne));
+        const W share = at_most(quotient(seen[i], all, s.to_share), kOne);
         const auto at_end = has_wall & (i + 1 == kQuarters ? zero == zero : zero < zero);
         for (std::size_t k = 0; k < count; ++k) {
             const W even = constant<W>(quarters.mean[k][i] << (kShareBits - kMeanBits)) -
@@ -269,13 +286,13 @@ HWY_INLINE FadingLight<W> fading_light_of_quarters(const InsideStage& s, const M
         std::array<W, 4> part;
         W quarters_color = zero;
         for (std::size_t k = 0; k < count; ++k) {
-            part[k] = min(quantise(sum[k][c], c < 3 ? s.to_color : s.to_white), one);
+            part[k] = at_most(quantise(sum[k][c], c < 3 ? s.to_color : s.to_white), s.one_color);
             quarters_color = quarters_color + part[k];
         }
         const W color = c < 3 ? min(whole.color[c], one) : one;
         W left = color;
         for (std::size_t k = 1; k < count; ++k) {
-            light.part[k][c] = min(divide(part[k] * color, divisor<W>(quarters_color), s.to_scaled), left);
+            light.part[k][c] = min(part_of_color(s, part[k], color, quarters_color), left);
             left = within(left - light.part[k][c], 0, s.one_color);
         }
         light.part[0][c] = left;
@@ -340,7 +357,7 @@ HWY_INLINE W opacity_of_pieces(const InsideStage& s, const PieceLight<W>& sum) {
 }
 template <class W>
 HWY_INLINE std::array<W, 3> color_of_pieces(const InsideStage& s, const PieceLight<W>& sum) {
-    const W opacity = opacity_of_pieces(s, sum), seen = max(opacity, constant<W>(1));
+    const W opacity = opacity_of_pieces(s, sum), seen = divisor<W>(opacity);
     const W largest = constant<W>(s.largest_color);
     // What is not lit is no brighter than opaque.
     const W limit = s.lit || !s.premultiplied ? largest

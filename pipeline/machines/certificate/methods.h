@@ -5,6 +5,7 @@
 #include "pipeline/classification/methods.h"
 #include "pipeline/classification/tables/exact_series.h"
 #include "pipeline/machines/certificate/function.h"
+#include "pipeline/machines/certificate/inside.h"
 #include "pipeline/machines/certificate/payers.h"
 
 #include <limits>
@@ -14,7 +15,7 @@ namespace squint {
 
 /// Post-classification, and how far a slab is from the function's own at what the sample may be.
 struct BoundedPostClassification {
-    static constexpr bool kNeedsBack = false;
+    static constexpr bool kNeedsBack = false, kPremultiplied = false;
     const PostClassification& words;
     const Function& function;
 };
@@ -35,11 +36,12 @@ SeriesKernel series_kernel(int order, bool legendre);
 /// the mean colour weighted by it: moving the ends by e moves the mean of a curve by its slope times e, for ways of
 /// any length.
 struct BoundedPowerSeries {
-    static constexpr bool kNeedsBack = true;
+    static constexpr bool kNeedsBack = true, kPremultiplied = false;
     std::variant<const PowerSeriesOfOrder1*, const MomentSeries*> words;
     const Function& function;
     const preintegration::ExactSeries& exact;
     SeriesKernel kernel;
+    BoundedPrefix prefix;
 };
 Slab<Bounded> classify(const BoundedPowerSeries& m, const Bounded& front, const Bounded& back,
                        const Bounded& length);

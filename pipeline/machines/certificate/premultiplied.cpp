@@ -3,6 +3,7 @@
 #include "core/portable_math.h"
 #include "pipeline/classification/methods-inl.h"
 #include "pipeline/machines/certificate.h"
+#include "pipeline/machines/certificate/slab_ends.h"
 
 #include <algorithm>
 #include <array>
@@ -44,46 +45,6 @@ SlabReach before_wall(const SlabReach& part, const std::array<double, 3>& wall) 
         slab.color[c] = {part.color[c].low + wall[c] * (1 - part.alpha.high),
                          std::min(part.color[c].high + wall[c] * (1 - part.alpha.low), 1.0)};
     return slab;
-}
-
-/// Both ends and the length of a slab, and all that they may be.
-struct SlabEnds {
-    double from, to, from_off, to_off, low, high, l, l_off, last;
-    SlabEnds(const EntryLookup& e, const Function& f, const Bounded& front, const Bounded& back,
-             const Bounded& length)
-        : last(f.last()) {
-        const double unit = std::ldexp(1.0, -e.input_fraction), full = std::ldexp(1.0, e.length_fraction);
-        from = std::min(in_double(front.v) * unit, last), to = std::min(in_double(back.v) * unit, last);
-        from_off = front.most() * unit, to_off = back.most() * unit;
-        low = std::max(std::min(from - from_off, to - to_off), 0.0);
-        high = std::min(std::max(from + from_off, to + to_off), last);
-        l = in_double(length.v) / full, l_off = length.most() / full;
-    }
-    Reach front() const { return around(from, from_off); }
-    Reach back() const { return around(to, to_off); }
-    Reach around(double at, double off) const { return {std::max(at - off, 0.0), std::min(at + off, last)}; }
-    double shortest() const { return std::max(l - l_off, 0.0); }
-    double longest() const { return std::min(l + l_off, 1.0); }
-};
-
-/// The opacity of a slab's own depth up to `end`, a place that does not move where it `stays`.
-Reach own_opacity(const Function& f, const SlabEnds& s, double end, bool stays) {
-    const double a = std::max(std::min(s.from - s.from_off, stays ? end : end - s.to_off), 0.0),
-                 b = std::min(std::max(s.from + s.from_off, stays ? end : end + s.to_off), s.last);
-    const Reach depths = f.over(Function::depth, a, b);
-    const double steep = f.slope(Function::depth, a, b), mean = f.mean(Function::depth, s.from, end);
-    if (!stays) {
-        const double off = steep * (s.from_off + s.to_off) / 2;
-        return {opacity_of(s.shortest() * std::max(mean - off, depths.low)),
-                opacity_of(s.longest() * std::min(mean + off, depths.high))};
-    }
-    // The part of the way up to a wall.
-    const double way = std::abs(end - s.from), span = std::abs(s.to - s.from),
-                 least = std::max(way - s.from_off, 0.0) / (span + s.from_off + s.to_off),
-                 most = std::min((way + s.from_off) / std::max(span - s.from_off - s.to_off, 1e-300), 1.0);
-    const double off = steep * s.from_off / 2;
-    return {opacity_of(s.shortest() * least * std::max(mean - off, depths.low)),
-            opacity_of(s.longest() * most * std::min(mean + off, depths.high))};
 }
 
 /// `full(front, back, least part, most part)`: all that a full slab's tables give over two intervals of inputs, of
@@ -154,19 +115,11 @@ Slab<Bounded> classify_within(const Method& m, const Bounded& front, const Bound
         } else if (around_front.all) {
             reach.take(point_at(at_front.low, at_front.high, {1, 1}));
         } else {
-            const double way = s.from < s.to ? 1 : -1;
-            std::optional<double> wall;
-            for (double entry = way > 0 ? std::ceil(s.from) : std::floor(s.from);
-                 (s.to - entry) * way >= 0 && !wall; entry += way)
-                if (f.opaque(entry, entry).any) wall = entry;
-            const bool meets = !around_front.any && wall && (*wall - s.from) * way > s.from_off &&
-                               (s.to - *wall) * way > s.to_off;
+            const std::optional<double> wall = s.first_wall(f);
+            const bool meets = !around_front.any && wall && s.surely_meets(*wall);
             if (meets) {
-                const double span = std::abs(s.to - s.from), off = s.from_off + s.to_off,
-                             seen = std::abs(*wall - s.from);
-                const SlabReach part =
-                    full(at_front, Reach{*wall, *wall}, std::max(seen - s.from_off, 0.0) / (span + off),
-                         std::min((seen + s.from_off) / std::max(span - off, 1e-300), 1.0));
+                const Reach seen = s.way_to(*wall);
+                const SlabReach part = full(at_front, Reach{*wall, *wall}, seen.low, seen.high);
                 std::array<double, 3> color{};
                 for (std::size_t c = 0; c < 3; ++c) color[c] = f.at(c, *wall);
                 if (may_be_full && !keeps_own_depth) reach.take(before_wall(part, color));

@@ -4,20 +4,23 @@
 
 #include "pipeline/classification/methods.h"
 #include "pipeline/machines/certificate/function.h"
+#include "pipeline/machines/certificate/inside.h"
 #include "pipeline/machines/certificate/payers.h"
 
 namespace squint {
 
 /// `real`: the same method in the plan that rounds nothing.
 struct BoundedCells {
-    static constexpr bool kNeedsBack = true;
+    static constexpr bool kNeedsBack = true, kPremultiplied = true;
     const PreIntegrated2D &words, &real;
     const Function& function;
+    BoundedPrefix prefix;
 };
 struct BoundedMeans {
-    static constexpr bool kNeedsBack = true;
+    static constexpr bool kNeedsBack = true, kPremultiplied = true;
     const PreIntegrated1D &words, &real;
     const Function &function, &means;
+    BoundedPrefix prefix;
 };
 Slab<Bounded> classify(const BoundedCells& m, const Bounded& front, const Bounded& back,
                        const Bounded& length);

@@ -51,7 +51,8 @@ void BoundedRay::composited(const Slab<Bounded>& slab, const Accumulated<Bounded
                  of_after = unit * (divided ? 1 - seen.clear_after : 1);
     for (std::size_t c = 0; c < 3; ++c) {
         seen.color[c] = {in_double(slab.color[c].v) * color_unit_, in_double(before.color[c].v) * of_before,
-                         in_double(after.color[c].v) * of_after, slab.color[c].error.scaled(color_unit_)};
+                         in_double(after.color[c].v) * of_after,
+                         within_light(slab.color[c].error, in_double(slab.color[c].v) * color_unit_)};
         changed = changed || before.color[c].v != after.color[c].v;
     }
     if (!changed) return;
@@ -80,6 +81,13 @@ void BoundedRay::limit(std::array<Shares, 4>& all, const std::array<double, 4>& 
     }
 }
 
+// Of a slab's colour in [0, brightest]: no further off than that lets it be.
+Shares BoundedRay::within_light(const Shares& error, double value) const {
+    const Shares off = error.scaled(color_unit_);
+    const double sum = off.sum(), most = std::max(value, brightest_ - value);
+    if (sum <= most) return off;
+    return std::isfinite(sum) ? off.scaled(most / sum) : Shares::one(-1, most);
+}
 double BoundedRay::clear(const Accumulated<Bounded>& pixel) const {
     const auto unit = static_cast<double>(s_.unit());
     const double t = in_double(pixel.transparency.v) / unit;

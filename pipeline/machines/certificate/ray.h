@@ -38,6 +38,7 @@ class BoundedRay : public Silent {
         double alpha_off = 0, clear_off = 0;  // clear_off: of T behind the slab
     };
 
+    Shares within_light(const Shares& error, double value) const;
     double clear(const Accumulated<Bounded>& pixel) const;
     static Reach opacities(const Seen& k);
     Reach colors(const Seen& k, std::size_t c) const;

@@ -2,6 +2,7 @@
 // includes this runs it.
 #pragma once
 
+#include "pipeline/machines/certificate/inside.h"
 #include "pipeline/machines/certificate/light.h"
 #include "pipeline/machines/certificate/payers.h"
 #include "pipeline/machines/certificate/reached.h"
@@ -77,6 +78,7 @@ struct BoundedCell {
 };
 struct BoundedVolume {
     const Volume& volume;
+    int weight_bits = 0;
     BoundedCell cell(const std::array<Bounded, 3>& at) const;
     template <class W>
     auto neighbourhood(const std::array<W, 3>& at) const;
@@ -84,8 +86,6 @@ struct BoundedVolume {
     auto box_sums(const std::array<W, 3>& at) const {
         return neighbourhood(at);
     }
-    template <class W>
-    W nears_wall(const WallStage& walls, const std::array<W, 3>& at) const;
 };
 
 /// The voxel nearest to a point, and all those that its location's error may make the nearest.
@@ -202,10 +202,20 @@ auto BoundedVolume::neighbourhood(const std::array<W, 3>& at) const {
         voxels.neighbourhood(cell)};
 }
 
-// Nor are slabs looked at twice.
-template <class W>
-W BoundedVolume::nears_wall(const WallStage&, const std::array<W, 3>&) const {
-    return unbounded(0);
+/// Whether a cell holds a wall, in all cells that the point may lie in.
+inline Bounded nears_wall(const BoundedVolume& voxels, const WallStage& walls,
+                          const CellPosition<Bounded>& at) {
+    const HWY_NAMESPACE::FromVolume volume{voxels.volume};
+    const std::array<std::int64_t, 3> cell{to_index(at.cell[0]), to_index(at.cell[1]), to_index(at.cell[2])};
+    const std::int64_t here = volume.nears_wall(walls, cell);
+    if (at.weight[0].exact && at.weight[1].exact && at.weight[2].exact) return {here, true, {}};
+    const ReachedCells cells = reached_cells(voxels.volume, cell, at.weight, voxels.weight_bits);
+    bool same = !cells.far;
+    for (std::int64_t z = cells.low[2]; same && z <= cells.high[2]; ++z)
+        for (std::int64_t y = cells.low[1]; same && y <= cells.high[1]; ++y)
+            for (std::int64_t x = cells.low[0]; same && x <= cells.high[0]; ++x)
+                same = volume.nears_wall(walls, std::array<std::int64_t, 3>{x, y, z}) == here;
+    return same ? Bounded{here, true, {}} : with_error(here, Shares::one(kWallsPay, 1));
 }
 
 }  // namespace squint
