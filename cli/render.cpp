@@ -248,6 +248,7 @@ Json render_frame(const Job& job, int frame) {
         if (a.bound || (!a.profile.empty() && !obstacle))
             certificate = certify(plan, {.threads = options.threads,
                                          .channels = a.bound && !job.output.empty(),
+                                         .known = a.profile.empty(),
                                          .cancelled = &interrupted});
         if (!a.profile.empty()) {
             const sweep::Proof proof = obstacle ? sweep::Proof(*obstacle) : sweep::Proof(certificate);

@@ -36,7 +36,7 @@ void certify_row(const Plan& plan, const M& bounded_method, int row, const Certi
                  Image* image, Row& to) {
     const int every = std::max(options.every, 1);
     const BoundedVolume voxels{*plan.volume, plan.interpolation.weight_bits};
-    BoundedRay ray(plan);
+    BoundedRay ray(plan, options.known);
     for (int column = 0; column < plan.camera.width; column += every) {
         const RaySetup setup = plan.set_up(column, row);
         if (setup.slabs == 0) continue;

@@ -45,9 +45,11 @@ inline constexpr std::array<std::string_view, 3> kDoubtNames{"wall", "terminatio
 inline constexpr double kUndecided = 0.5;  // LSB8
 
 struct CertificateOptions {
-    int threads = 0;                // 0: one a processor
-    bool channels = false;          // keep the bound of every pixel
-    int payer = -1;                 // of the bound of every pixel only this one's share
+    int threads = 0;        // 0: one a processor
+    bool channels = false;  // keep the bound of every pixel
+    int payer = -1;         // of the bound of every pixel only this one's share
+    // Of compositing, what its roundings took: a bound of this picture alone, not linear in a wire's last bit.
+    bool known = false;
     int every = 1;                  // rows and columns: the first of so many
     double undecided = kUndecided;  // of walls and gradients, LSB8
     const std::atomic<bool>* cancelled = nullptr;

@@ -31,7 +31,7 @@ double brightest_lit(const ShadingSettings& s, double color) {
 
 }  // namespace
 
-BoundedRay::BoundedRay(const Plan& plan) : s_(plan.compositing) {
+BoundedRay::BoundedRay(const Plan& plan, bool known) : s_(plan.compositing), known_(known) {
     const double alpha_bits = std::ldexp(1.0, -s_.alpha_fraction);
     alpha_unit_ = alpha_bits;
     const Wire color = plan.lit ? Wire::lit_color : s_.premultiplied ? Wire::slab_color : Wire::slab_ratio;
@@ -120,6 +120,14 @@ Reach BoundedRay::gathered(const Seen& k, std::size_t c, const Reach& behind) co
 bool BoundedRay::carries() const {
     return s_.form == CompositingForm::w_carry && s_.to_transparency.shift <= 0;
 }
+// What a step takes, by who may take it.
+void BoundedRay::add_step_shares(Shares& shares, double known,
+                                 std::initializer_list<std::pair<int, double>> usual) const {
+    double all = 0;
+    for (const auto& item : usual) all += item.second;
+    if (!known_ || all <= known) return add_local(shares, known, usual);
+    for (const auto& [who, error] : usual) shares[who] += error / all * known;
+}
 // kappa + lambda G, G what lies behind: in w lambda = -rho and kappa = rho c + sigma.  Where the remainder is
 // carried rho is left out, and returned.
 double BoundedRay::add_step(Shares& shares, const Seen& k, std::size_t c, const Reach& behind,
@@ -138,16 +146,16 @@ double BoundedRay::add_step(Shares& shares, const Seen& k, std::size_t c, const 
     if (s_.takes_from_transparency()) {
         const double of_w =
             told(lambda) > 0 ? unit_of(s_.to_contribution) * bit(s_.contribution_fraction) : 0;
-        add_local(shares, known,
-                  {{index_of(Wire::contribution), of_w * apart},
-                   {index_of(Wire::transparency), of_clear * behind.high},
-                   {index_of(Wire::color), of_color}});
+        add_step_shares(shares, known,
+                        {{index_of(Wire::contribution), of_w * apart},
+                         {index_of(Wire::transparency), of_clear * behind.high},
+                         {index_of(Wire::color), of_color}});
     } else {
         const double of_product = is_color ? unit_of(s_.to_slab_color) * bit(s_.color_fraction) : 0;
-        add_local(shares, known,
-                  {{index_of(Wire::slab_color), of_product * k.clear_before},
-                   {index_of(Wire::transparency), of_clear * (is_color ? behind.high : apart)},
-                   {index_of(Wire::color), of_color}});
+        add_step_shares(shares, known,
+                        {{index_of(Wire::slab_color), of_product * k.clear_before},
+                         {index_of(Wire::transparency), of_clear * (is_color ? behind.high : apart)},
+                         {index_of(Wire::color), of_color}});
     }
     return carried;
 }

@@ -7,6 +7,8 @@
 #include "pipeline/slab.h"
 
 #include <array>
+#include <initializer_list>
+#include <utility>
 #include <vector>
 
 namespace squint {
@@ -14,7 +16,8 @@ namespace squint {
 /// Hears every slab of a ray, then bounds its pixel.
 class BoundedRay : public Silent {
   public:
-    explicit BoundedRay(const Plan& plan);
+    /// `known`: of what compositing rounds what it took, not what it may take.
+    BoundedRay(const Plan& plan, bool known);
 
     void begin() { slabs_.clear(); }
     void composited(const Slab<Bounded>& slab, const Accumulated<Bounded>& before,
@@ -49,7 +52,11 @@ class BoundedRay : public Silent {
     void from_the_back(std::array<Shares, 4>& all, bool stopped);
     void from_the_front(std::array<Shares, 4>& all);
 
+    void add_step_shares(Shares& shares, double known,
+                         std::initializer_list<std::pair<int, double>> usual) const;
+
     const CompositingStage& s_;
+    bool known_;
     double alpha_unit_ = 1, color_unit_ = 1, brightest_ = 0;
     std::vector<Seen> slabs_;
 };

@@ -158,9 +158,9 @@ Compared compared(const Plan& plan, const Certificate& certificate) {
     }
     return all;
 }
-Compared compared(const Plan& plan) {
+Compared compared(const Plan& plan, bool known = false) {
     CertificateOptions options;
-    options.channels = true, options.threads = 1;
+    options.channels = true, options.threads = 1, options.known = known;
     return compared(plan, certify(plan, options));
 }
 
@@ -262,6 +262,14 @@ TEST(Certificate, OfCarriedRemaindersDoesNotGrowWithTheSlabs) {
     EXPECT_GT(of("w", "0.25"), 2 * of("w", "1")) << "four times the slabs";
     EXPECT_LT(of("w_carry", "0.25"), 1.5 * of("w_carry", "1"));
     EXPECT_LT(of("w_carry", "0.25"), of("w", "0.25") / 4);
+}
+
+// What roundings took is less than what they may take, and still no less than what they did.
+TEST(Certificate, OfKnownRoundingsIsTighterInFog) {
+    const Plan plan = plan_of("hard/fog.toml", {"image.width=16", "image.height=16", "compositing.form=w"});
+    const Compared any = compared(plan), known = compared(plan, true);
+    EXPECT_EQ(known.over, "");
+    EXPECT_LT(known.bound, 0.9 * any.bound);
 }
 
 TEST(Certificate, RefusesWhatItDoesNotBoundInOneLine) {
