@@ -271,9 +271,6 @@ std::optional<std::string> what_has_no_scene_bound(const Plan& plan) {
     if (!std::holds_alternative<PostClassification>(plan.method))
         return fmt::format("classification.method {} has no scene bound yet; allowed: pc, pc_mid",
                            name_of(plan.scene.classification.method));
-    if (plan.projection_mode)
-        return fmt::format("compositing.mode {} has no scene bound yet; allowed: over",
-                           name_of(plan.scene.compositing.mode));
     if (plan.interpolation.nearest)
         return "sampling.interpolation nearest jumps from voxel to voxel; allowed: trilinear";
     const CompositingForm form = plan.compositing.form;
@@ -292,7 +289,8 @@ SceneBound bound_scene(const Plan& plan, const SceneBoundOptions& options) {
     const CellValues steepest{0, std::max(range, 1.0), 3 * range};
     const SlabCosts costs(plan, errors, errors.of(steepest));
     const CompositingCosts compositing = compositing_costs(plan);
-    const double termination = may_terminate(plan) ? plan.compositing.threshold_exact : 0;
+    const double termination =
+        !plan.projection_mode && may_terminate(plan) ? plan.compositing.threshold_exact : 0;
 
     SceneBound b;
     b.samples = static_cast<std::int64_t>(most_steps(plan)) + 1;
@@ -305,6 +303,22 @@ SceneBound bound_scene(const Plan& plan, const SceneBoundOptions& options) {
             return 255 * (sum * (1 + 0x1p-20) + 0x1p-36);
         };
         CellValues whole{1.0 * plan.volume->smallest, 1.0 * plan.volume->largest, blocks.steepest()};
+        if (plan.projection_mode) {
+            // An extreme, or a mean, errs by no more than the samples do: one slab of any value in the data.
+            CostBlocks::Found found{costs.of(whole), costs.visible(whole)};
+            found.costs.at.back() = 0;
+            const Behind behind = any_sequence(beams, found, 1);
+            b.most = b.by_entries = b.by_blocks = b.by_beams = in_lsb8(behind);
+            const SlabCosts::Decided slab = costs.decided(whole, 0, false);
+            b.shares = compositing.shares.scaled(255);
+            b.shares.add(slab.shares, 255);
+            b.shares[kDoublesPay] += 255 * 0x1p-36;
+            for (int p = 0; p < Shares::kMost; ++p)
+                if (b.shares[p] > b.shares[b.payer]) b.payer = p;
+            b.block_first = blocks.cells().first, b.block_last = blocks.cells().last;
+            b.block_share = 255 * slab.cost, b.entry = costs.entry_of(slab.bin);
+            return;
+        }
         b.by_entries = in_lsb8(any_sequence(beams, {costs.of(whole), costs.visible(whole)}, b.samples));
         b.by_blocks = in_lsb8(any_sequence(beams, blocks.all(), b.samples));
         Search search(beams, options);

@@ -42,6 +42,15 @@ SampleErrors sample_errors(const Plan& plan) {
         e.of_rounding[Shares::kElsewhere] = off * (plan.volume->largest + 1.0);
         e.of_rounding[kDoublesPay] = static_cast<double>(plan.entries.size()) * 0x1p-50;
     }
+    if (plan.scene.compositing.mode == CompositingMode::average) {
+        // Its quotient is rounded, and its last slab counts by a rounded length, of two slabs at least.
+        e.of_rounding[index_of(Wire::classification_input)] +=
+            rounding_of(1e-300, plan.to_average.rounding) *
+            std::ldexp(1.0, -plan.specs[Wire::classification_input].format.fraction_bits);
+        e.of_rounding[index_of(Wire::length)] +=
+            (plan.volume->largest - plan.volume->smallest + 1) * std::abs(e.scale) *
+            std::ldexp(1.0, -plan.specs[Wire::length].format.fraction_bits);
+    }
     e.rounding = e.of_rounding.sum();
     return e;
 }
