@@ -101,7 +101,10 @@ std::string bound_text(const SceneBound& b) {
 int run(const PlanArguments& a) {
     const Plan plan = plan_of(a.scene);
     std::optional<SceneBound> bound;
-    if (a.bound) bound = bound_scene(plan);
+    if (a.bound) {
+        const Interruptible here;
+        bound = bound_scene(plan, {.cancelled = &interrupted});
+    }
     if (a.json) {
         nlohmann::ordered_json record = json_of_plan(plan);
         if (bound) record["bound"] = json_of(*bound);
