@@ -73,7 +73,10 @@ std::string summary(const search::Settings& s, const search::Result& r) {
 }
 
 std::string summary(const search::Settings& s, const search::CertifiedResult& r) {
-    std::string text = fmt::format("bound of at most {:g} LSB8, proven for {} pictures; {} certificates\n",
+    std::string text =
+        s.every_view ? fmt::format("bound of at most {:g} LSB8, proven for every view; {} scene bounds\n",
+                                   s.most_error, r.certificates)
+                     : fmt::format("bound of at most {:g} LSB8, proven for {} pictures; {} certificates\n",
                                    s.most_error, r.pictures, r.certificates);
     std::vector<std::vector<std::string>> rows{{"", "bits", "bound", "measured", "undecided rays"}};
     const auto row = [&](const char* name, const search::Proven& p) {
@@ -87,10 +90,15 @@ std::string summary(const search::Settings& s, const search::CertifiedResult& r)
         rows.push_back({std::string(info(wire).name), to_string(r.found.specs[wire].format),
                         to_string(r.scene.specs[wire].format)});
     text += table_text(rows) + "\n";
-    text += fmt::format(
-        "guarantee: pictures; no pixel of these {} errs by more than {:.4g} LSB8 by rounding; nothing is "
-        "proven of other views, sizes or data\n",
-        r.pictures, r.found.bound);
+    text += s.every_view ? fmt::format(
+                               "guarantee: scene; no pixel of any view errs by more than {:.4g} LSB8 by "
+                               "rounding; nothing is proven of other data\n",
+                               r.found.bound)
+                         : fmt::format(
+                               "guarantee: pictures; no pixel of these {} errs by more than {:.4g} LSB8 by "
+                               "rounding; nothing is "
+                               "proven of other views, sizes or data\n",
+                               r.pictures, r.found.bound);
     return text + fmt::format("{}: squint render {}--set precision.preset={}\n", r.formats_file,
                               s.scenes.empty() ? "" : s.scenes[0] + " ",
                               std::filesystem::absolute(r.formats_file).string());
@@ -117,12 +125,13 @@ int run(const SearchArguments& a) {
         if (!a.quiet) line.clear(), say(fmt::format("note: {}\n", note));
     };
     const Interruptible here;
-    if (a.guarantee == "pictures") {
+    if (a.guarantee != "views") {
+        settings.every_view = a.guarantee == "scene";
         if (settings.cost != search::CostKind::bits || settings.figure != search::Figure::largest ||
             settings.srgb)
-            throw InputError(
-                "--guarantee pictures: bounds are of the greatest error in linear light, and bits are what "
-                "is made few; allowed: without --cost, --figure and --transfer");
+            throw InputError("--guarantee " + a.guarantee +
+                             ": bounds are of the greatest error in linear light, and bits are what "
+                             "is made few; allowed: without --cost, --figure and --transfer");
         const search::CertifiedResult result = run_by_certificate(settings);
         line.clear();
         return told(a, settings, result);
@@ -174,9 +183,9 @@ void flags(Flags& f, SearchArguments& a) {
         .shows_default();
     f.add("--guarantee", a.guarantee,
           "What the formats are held to: views, formats that a held-out view breaks are never written; or "
-          "pictures, no pixel of the --views pictures can err by more, proven (docs/guarantees.md); "
-          "default: views")
-        .one_of({"views", "pictures"})
+          "pictures, no pixel of the --views pictures can err by more, proven; or scene, no pixel of any "
+          "view (docs/guarantees.md); default: views")
+        .one_of({"views", "pictures", "scene"})
         .value("NAME");
     f.add("--restarts", s.descent.restarts, "Times that the search starts again from a random place below")
         .between(0, 10000)

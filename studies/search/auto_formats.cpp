@@ -29,11 +29,13 @@ class Choice {
     Choice(const Scene& scene, std::shared_ptr<const Volume> volume, const AutoSettings& settings)
         : scene_(scene), volume_(std::move(volume)) {
         scene_.precision.preset = "default";
-        const int frames = std::max(scene_.camera.turntable, 1), views = std::min(frames, kMostViews);
+        const bool every_view = scene.precision.guarantee == Guarantee::scene;
+        const int frames = every_view ? 1 : std::max(scene_.camera.turntable, 1),
+                  views = std::min(frames, kMostViews);
         for (int view = 0; view < views; ++view) {
             frames_.push_back(view * frames / views);
             const Plan plan = make_plan(scene_, volume_, frames_.back());
-            if (const auto obstacle = what_is_not_bounded(plan))
+            if (const auto obstacle = every_view ? what_has_no_scene_bound(plan) : what_is_not_bounded(plan))
                 throw InputError(
                     fmt::format("{}: found \"auto\", but {}", at(scene, "precision.preset"), *obstacle));
             if (view == 0) base_ = plan.specs, pictures.least = least_bits(plan);
@@ -53,7 +55,11 @@ class Choice {
                                 .every = 1,
                                 .undecided = scene.precision.budget / 4,
                                 .cancelled = settings.cancelled};
-        while (rays() > kMostRays) ++pictures.certificate.every;
+        if (every_view)
+            pictures.every_view = {
+                .threads = settings.threads, .most_beams = kBeamsOnTheWay, .cancelled = settings.cancelled};
+        else
+            while (rays() > kMostRays) ++pictures.certificate.every;
     }
     Choice(const Choice&) = delete;
     Choice& operator=(const Choice&) = delete;
@@ -96,11 +102,6 @@ AutoFormats choose_formats(Scene& scene, const std::shared_ptr<const Volume>& vo
     AutoFormats result;
     if (scene.precision.preset != "auto" || has_all_formats(scene.precision)) return result;
     const double budget = scene.precision.budget;
-    if (scene.precision.guarantee == Guarantee::scene)
-        throw InputError(
-            fmt::format("{}: found \"scene\"; formats are not chosen by plan --bound yet; allowed: "
-                        "\"pictures\"",
-                        at(scene, "precision.guarantee")));
     if (const SamplingSettings none;
         !scene.given_at.contains("sampling.termination") && scene.sampling.termination == none.termination) {
         scene.sampling.termination = kTermination;
@@ -122,14 +123,21 @@ AutoFormats choose_formats(Scene& scene, const std::shared_ptr<const Volume>& vo
     result.bound = proof.most, result.rays = proof.rays;
     result.one_in = choice.pictures.certificate.every;
     result.bits = choice.pictures.cost(bits), result.bits_of_default = choice.pictures.cost(choice.bits);
-    result.notes.push_back(fmt::format(
-        "precision auto: no decided ray of {} errs by more than {:.3g} LSB8 by rounding (budget {:g}){}; "
-        "{:.0f} bits by the "
-        "tally, `default` has {:.0f}",
-        proof.rays, proof.most, budget,
-        result.one_in > 1 ? fmt::format(", one row and column in {}: --bound certifies all", result.one_in)
-                          : "",
-        result.bits, result.bits_of_default));
+    if (choice.pictures.every_view)
+        result.notes.push_back(fmt::format(
+            "precision auto: no pixel of any view errs by more than {:.3g} LSB8 by rounding (budget {:g}); "
+            "{:.0f} bits by the tally, `default` has {:.0f}",
+            proof.most, budget, result.bits, result.bits_of_default));
+    else
+        result.notes.push_back(fmt::format(
+            "precision auto: no decided ray of {} errs by more than {:.3g} LSB8 by rounding (budget {:g}){}; "
+            "{:.0f} bits by the "
+            "tally, `default` has {:.0f}",
+            proof.rays, proof.most, budget,
+            result.one_in > 1
+                ? fmt::format(", one row and column in {}: --bound certifies all", result.one_in)
+                : "",
+            result.bits, result.bits_of_default));
     result.undecided = proof.undecided;
     if (proof.undecided > 0)
         result.warnings.push_back(

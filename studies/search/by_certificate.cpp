@@ -61,6 +61,7 @@ class ByCertificate {
 
   private:
     std::size_t scenes() const { return std::max<std::size_t>(sweep_.scenes.size(), 1); }
+    const char* guarantee() const { return s_.every_view ? "scene" : "pictures"; }
     std::string name_of_scene(std::size_t i) const {
         return sweep_.scenes.empty() ? "the built-in scene" : sweep_.scenes[i];
     }
@@ -80,8 +81,10 @@ class ByCertificate {
         std::set<Wire> used;
         for (std::size_t i = 0; i < scenes(); ++i) {
             const Plan plan = plan_of(i, {}, 0);
-            if (const auto obstacle = what_is_not_bounded(plan))
-                throw InputError(fmt::format("--guarantee pictures: {}: {}", name_of_scene(i), *obstacle));
+            if (const auto obstacle =
+                    s_.every_view ? what_has_no_scene_bound(plan) : what_is_not_bounded(plan))
+                throw InputError(
+                    fmt::format("--guarantee {}: {}: {}", guarantee(), name_of_scene(i), *obstacle));
             if (i == 0)
                 preset_ = plan.scene.precision.preset, width_ = plan.camera.width,
                 height_ = plan.camera.height;
@@ -132,14 +135,20 @@ class ByCertificate {
         all.cost = [this](const Bits& bits) { return cost(bits); };
         all.least = least_bits(plan_of(0, {}, 0));
         all.certificate = {.threads = s_.threads, .cancelled = s_.cancelled};
+        if (s_.every_view) {
+            all.count = scenes();
+            all.plan = [this](const Bits& bits, std::size_t i) { return plan_of(i, bits, 0); };
+            all.every_view = {.threads = s_.threads, .most_beams = kBeamsOnTheWay, .cancelled = s_.cancelled};
+        }
         all.proven = [this](const Proof& proof) {
-            result_.certificates += result_.pictures;
+            result_.certificates += s_.every_view ? scenes() : result_.pictures;
             for (const Wire wire : result_.wires)
                 if (proof.worst[static_cast<int>(wire)] > proof.worst[static_cast<int>(result_.binding)])
                     result_.binding = wire;
             if (s_.progress)
-                s_.progress(fmt::format("{} certificates; bound {:.4g} of {:.4g} LSB8", result_.certificates,
-                                        proof.most, s_.most_error));
+                s_.progress(fmt::format("{} {}; bound {:.4g} of {:.4g} LSB8", result_.certificates,
+                                        s_.every_view ? "scene bounds" : "certificates", proof.most,
+                                        s_.most_error));
         };
         return all;
     }
@@ -168,13 +177,22 @@ class ByCertificate {
     }
 
     std::string formats_text(const Bits& bits) const {
-        std::string text = fmt::format(
-            "# By squint search --guarantee pictures: no pixel of {} pictures ({} x {} pixels, {}) can err "
-            "by more than\n"
-            "# {:.4g} LSB8 by rounding, proven.  Nothing is proven of other views, sizes or data.\n"
-            "#   squint render SCENE --set precision.preset=THIS_FILE --bound\n"
-            "[precision]\npreset = \"{}\"\n",
-            result_.pictures, width_, height_, name_of_scene(0), result_.found.bound, preset_);
+        std::string text =
+            s_.every_view
+                ? fmt::format(
+                      "# By squint search --guarantee scene: no pixel of any view of {} can err by more "
+                      "than\n# {:.4g} LSB8 by rounding, proven.  Nothing is proven of other data.\n"
+                      "#   squint plan SCENE --set precision.preset=THIS_FILE --bound\n"
+                      "[precision]\npreset = \"{}\"\n",
+                      name_of_scene(0), result_.found.bound, preset_)
+                : fmt::format(
+                      "# By squint search --guarantee pictures: no pixel of {} pictures ({} x {} pixels, {}) "
+                      "can err "
+                      "by more than\n"
+                      "# {:.4g} LSB8 by rounding, proven.  Nothing is proven of other views, sizes or data.\n"
+                      "#   squint render SCENE --set precision.preset=THIS_FILE --bound\n"
+                      "[precision]\npreset = \"{}\"\n",
+                      result_.pictures, width_, height_, name_of_scene(0), result_.found.bound, preset_);
         for (const auto& item : bits)
             text += fmt::format("{} = \"{}\"\n", info(item.first).name,
                                 to_string(result_.found.specs[item.first]));
@@ -193,7 +211,7 @@ class ByCertificate {
         json.update({{"command", s_.command},
                      {"scenes", sweep_.scenes},
                      {"max_error_lsb8", s_.most_error},
-                     {"guarantee", "pictures"},
+                     {"guarantee", guarantee()},
                      {"degrees", result_.degrees},
                      {"certificates", result_.certificates},
                      {"preset", preset_},

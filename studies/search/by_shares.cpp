@@ -64,7 +64,12 @@ int Proof::binding() const {
 
 Proof prove(const Pictures& pictures, const Bits& bits) {
     Proof proof;
-    for (std::size_t i = 0; i < pictures.count; ++i) {
+    for (std::size_t i = 0; pictures.every_view && i < pictures.count; ++i) {
+        const SceneBound b = bound_scene(pictures.plan(bits, i), *pictures.every_view);
+        if (b.most > proof.most) proof.most = b.most, proof.worst = b.shares;
+        proof.greatest = greatest(proof.greatest, b.shares);
+    }
+    for (std::size_t i = 0; !pictures.every_view && i < pictures.count; ++i) {
         const Certificate c = certify(pictures.plan(bits, i), pictures.certificate);
         const bool decided = pictures.decided_rays;
         const double most = decided ? c.most_decided : c.most;

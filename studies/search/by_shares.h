@@ -11,12 +11,14 @@
 #pragma once
 
 #include "pipeline/machines/certificate.h"
+#include "pipeline/machines/scene_bound.h"
 #include "pipeline/plan/plan.h"
 
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 
 namespace squint::search {
 
@@ -42,13 +44,19 @@ struct Pictures {
     std::map<Wire, int> least;                           // fraction bits that a wire keeps
     bool decided_rays = false;  // prove nothing of rays that hang on a wall or on a gradient's direction
     CertificateOptions certificate;
-    std::function<void(const Proof&)> proven;  // hears every proof; may be empty
+    std::optional<SceneBoundOptions> every_view;  // bound all views of `count` scenes, not their pictures
+    std::function<void(const Proof&)> proven;     // hears every proof; may be empty
 };
 
 /// The fraction bits above, of wires that have `bits` and pay `greatest`, for a bound of `most_error` LSB8.  A wire
 /// that pays nothing keeps its own.
 Bits equal_shares(const Shares& greatest, const Bits& bits, const std::map<Wire, int>& least,
-                  double most_error);
+                  double most_error, const std::map<Wire, int>& most = {});
+/// What no wire's bits can take away.
+double fixed_part(const Shares& greatest);
+
+/// Beams of each scene bound on the way: the bound of formats that are found is as good as theirs.
+inline constexpr std::int64_t kBeamsOnTheWay = 1 << 14;
 
 /// What a plan's certificates ask of formats.
 std::map<Wire, int> least_bits(const Plan& plan);

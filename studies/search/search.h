@@ -30,6 +30,7 @@ struct Settings {
     bool srgb = false;         // compare colours as a display shows them
     std::vector<Wire> wires;   // empty: all that the scenes use
     bool integer_bits = true;  // search them too; false: they stay as the scenes have them
+    bool every_view = false;   // by certificate: prove the bound for all views of every scene
     int views = 2;    // of a full turn of each scene's camera to tune on; as many, and 16 at least, held out
     int repeats = 5;  // of a timed picture
     Options descent{.restarts = 4, .seed = 1};

@@ -4,6 +4,7 @@
 #include "core/error.h"
 #include "core/volume_source.h"
 #include "pipeline/machines/certificate.h"
+#include "pipeline/machines/scene_bound.h"
 #include "pipeline/record.h"
 #include "pipeline/render.h"
 #include "scene/presets.h"
@@ -62,6 +63,20 @@ TEST(AutoFormats, KeepEveryPictureWithinTheBudget) {
         }
 }
 
+TEST(AutoFormats, OfEveryViewKeepTheSceneBoundWithinTheBudget) {
+    for (const char* budget : {"2", "8"}) {
+        const Chosen c = chosen({std::string("precision.budget=") + budget, "precision.guarantee=scene"});
+        SCOPED_TRACE(budget);
+        ASSERT_TRUE(c.formats.within);
+        EXPECT_THAT(c.formats.notes,
+                    ::testing::Contains(HasSubstr("no pixel of any view errs by more than")));
+        const SceneBound bound = bound_scene(make_plan(c.scene, c.volume));
+        EXPECT_LE(bound.most, std::stod(budget));
+        EXPECT_GT(c.formats.bound, std::stod(budget) / 4) << "no more bits than asked for";
+        EXPECT_LE(measured(c), bound.most);
+    }
+}
+
 TEST(AutoFormats, DoNotDependOnThreads) {
     const Chosen one = chosen({}, 1), three = chosen({}, 3);
     EXPECT_EQ(one.scene.precision.override_, three.scene.precision.override_);
@@ -108,8 +123,10 @@ TEST(AutoFormats, RefuseWhatHasNoCertificateInOneLine) {
         }
         return "nothing was refused";
     };
-    EXPECT_THAT(refusal({"precision.guarantee=scene"}),
-                HasSubstr("--set precision.guarantee: found \"scene\""));
+    EXPECT_THAT(
+        refusal({"precision.guarantee=scene", "classification.method=leg"}),
+        HasSubstr("--set precision.preset: found \"auto\", but classification.method leg has no scene "
+                  "bound"));
     EXPECT_THAT(refusal({"classification.method=pips", "classification.as_printed=true"}),
                 HasSubstr("--set precision.preset: found \"auto\", but classification.as_printed"));
     EXPECT_THAT(refusal({"precision.budget=0"}), HasSubstr("precision.budget"));

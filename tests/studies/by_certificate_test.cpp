@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "core/volume_source.h"
 #include "pipeline/machines/certificate.h"
+#include "pipeline/machines/scene_bound.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -56,6 +57,22 @@ TEST_F(ByCertificate, WritesFormatsWhoseCertificatesHoldForEveryPicture) {
             worst = std::max(worst, certify(make_plan(scene, volume, view)).most);
         EXPECT_DOUBLE_EQ(worst, r.found.bound);
     }
+}
+
+TEST_F(ByCertificate, WritesFormatsWhoseSceneBoundHoldsForEveryView) {
+    Settings s = small(4);
+    s.every_view = true;
+    s.overrides.push_back("classification.method=pc");
+    const CertifiedResult r = run_by_certificate(s);
+    ASSERT_EQ(r.failure, "");
+    EXPECT_LE(r.found.bound, 4);
+    EXPECT_LE(r.found.error, r.found.bound);
+    EXPECT_EQ(r.json["guarantee"], "scene");
+    std::vector<std::string> overrides = s.overrides;
+    overrides.push_back("precision.preset=\"" + r.formats_file + "\"");
+    const Scene scene = scene_with(built_in_scene(), overrides);
+    const auto volume = std::make_shared<const Volume>(load_volume(volume_source(scene)));
+    EXPECT_LE(bound_scene(make_plan(scene, volume)).most, r.found.bound);
 }
 
 TEST_F(ByCertificate, TakesFewerBitsForALooserBound) {
