@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "pipeline/machines/certificate.h"
+#include "pipeline/plan/ranges.h"
 #include "scene/presets.h"
 #include "studies/search/by_shares.h"
 #include "studies/sweep/cost.h"
@@ -16,6 +17,8 @@ namespace {
 constexpr double kTermination = 0x1p-12;
 constexpr int kMostViews = 8;
 constexpr std::int64_t kMostRays = 3000;  // of all certificates of a set of formats
+// Rays of more samples count by the square of how many more: they take longer, and are alike.
+constexpr double kLongRay = 512;
 // Of the budget, where rays are left out: others may be a little worse.
 constexpr double kOfSomeRays = 0.85;
 constexpr int kRaises = 12, kTakenBack = 3;
@@ -29,6 +32,7 @@ class Choice {
     Choice(const Scene& scene, std::shared_ptr<const Volume> volume, const AutoSettings& settings)
         : scene_(scene), volume_(std::move(volume)) {
         scene_.precision.preset = "default";
+        double longer = 1;  // than kLongRay
         const bool every_view = scene.precision.guarantee == Guarantee::scene;
         const int frames = every_view ? 1 : std::max(scene_.camera.turntable, 1),
                   views = std::min(frames, kMostViews);
@@ -39,6 +43,7 @@ class Choice {
                 throw InputError(
                     fmt::format("{}: found \"auto\", but {}", at(scene, "precision.preset"), *obstacle));
             if (view == 0) base_ = plan.specs, pictures.least = least_bits(plan);
+            longer = std::max(longer, most_steps(plan) / kLongRay);
             for (const Wire wire : plan.used_wires)
                 if (!scene.precision.override_[static_cast<std::size_t>(wire)])
                     bits[wire] = base_[wire].format.fraction_bits;
@@ -59,7 +64,7 @@ class Choice {
             pictures.every_view = {
                 .threads = settings.threads, .most_beams = kBeamsOnTheWay, .cancelled = settings.cancelled};
         else
-            while (rays() > kMostRays) ++pictures.certificate.every;
+            while (static_cast<double>(rays()) * longer * longer > kMostRays) ++pictures.certificate.every;
     }
     Choice(const Choice&) = delete;
     Choice& operator=(const Choice&) = delete;

@@ -77,6 +77,18 @@ TEST(AutoFormats, OfEveryViewKeepTheSceneBoundWithinTheBudget) {
     }
 }
 
+// A ray of 4096 samples: fewer of them are certified.
+TEST(AutoFormats, OfLongRaysAreChosenFromFewerOfThem) {
+    const Chosen c = chosen({"volume.procedural=constant", "volume.dims=[3, 4096, 3]", "camera.height=2",
+                             "camera.azimuth=0", "camera.elevation=0", "image.width=40", "image.height=40",
+                             "transfer_function.points=[[0,1,1,1,5e-5],[255,1,1,1,5e-5]]",
+                             "transfer_function.unit_distance=1", "sampling.termination=0"});
+    EXPECT_TRUE(c.formats.within);
+    EXPECT_GT(c.formats.one_in, 1);
+    EXPECT_LE(c.formats.rays, 3000 / 64);
+    EXPECT_GT(c.formats.rays, 0);
+}
+
 TEST(AutoFormats, DoNotDependOnThreads) {
     const Chosen one = chosen({}, 1), three = chosen({}, 3);
     EXPECT_EQ(one.scene.precision.override_, three.scene.precision.override_);
