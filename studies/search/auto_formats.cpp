@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "pipeline/machines/certificate.h"
 #include "pipeline/plan/ranges.h"
+#include "pipeline/plan_record.h"
 #include "scene/presets.h"
 #include "studies/search/by_shares.h"
 #include "studies/sweep/cost.h"
@@ -10,6 +11,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string_view>
 
 namespace squint::search {
 namespace {
@@ -100,6 +104,61 @@ class Choice {
     WireSpecs base_;
 };
 
+// Stages that no lanes of 32 bits hold, and the bits that they need.
+struct WideStages {
+    std::vector<std::string_view> names;
+    int bits = 0;
+};
+WideStages wide_stages(const Plan& plan) {
+    WideStages wide;
+    for (std::size_t stage = 0; stage < kStages.size(); ++stage) {
+        if (lane_bits(plan, stage).value_or(32) == 32) continue;
+        wide.names.push_back(kStages[stage]);
+        wide.bits += plan.stages[stage].needs.lane_bits + plan.stages[stage].needs.wide_bits;
+    }
+    return wide;
+}
+/// Takes bits from wires of stages that 32-bit lanes would hold without them, and gives others what the budget then
+/// asks for: kept where the tally does not rise.
+void narrow(Pictures pictures, double aim, Bits& bits, Proof& proof) {
+    constexpr int kMostSteps = 8;
+    const WideStages before = wide_stages(pictures.plan(bits, 0));
+    if (before.names.empty()) return;
+    Bits fewer = bits;
+    int left = before.bits;
+    for (int step = 0; left > 0 && step < kMostSteps; ++step) {
+        std::optional<Wire> best;
+        double least = 0;
+        for (const auto& [wire, fraction] : fewer) {
+            const bool near = wire == Wire::slab_alpha || std::find(before.names.begin(), before.names.end(),
+                                                                    info(wire).stage) != before.names.end();
+            if (!near || fraction <= 1) continue;
+            Bits one_less = fewer;
+            --one_less[wire];
+            if (wide_stages(pictures.plan(one_less, 0)).bits >= left) continue;
+            const double share = std::ldexp(proof.share(wire), bits[wire] - fraction);
+            if (!best || share < least) best = wire, least = share;
+        }
+        if (!best) return;
+        pictures.most[*best] = --fewer[*best];
+        left = wide_stages(pictures.plan(fewer, 0)).bits;
+    }
+    // What those wires will pay at least.
+    double alone = fixed_part(proof.greatest);
+    for (const auto& [wire, fraction] : pictures.most)
+        alone = std::max(alone, std::ldexp(proof.share(wire), bits[wire] - fraction));
+    if (left > 0 || alone > aim) return;
+    Proof proven;
+    if (!reach(pictures, aim, kRaises, fewer, proven)) return;
+    take_back(pictures, aim, kTakenBack, fewer, proven);
+    if (pictures.cost(fewer) <= pictures.cost(bits)) bits = fewer, proof = proven;
+}
+std::string lanes_of(const Plan& plan) {
+    const WideStages wide = wide_stages(plan);
+    if (wide.names.empty()) return "all stages in 32-bit lanes";
+    return fmt::format("64-bit lanes for {}", fmt::join(wide.names, ", "));
+}
+
 }  // namespace
 
 AutoFormats choose_formats(Scene& scene, const std::shared_ptr<const Volume>& volume,
@@ -119,7 +178,10 @@ AutoFormats choose_formats(Scene& scene, const std::shared_ptr<const Volume>& vo
     Proof proof;
     const double aim = budget * (choice.pictures.certificate.every > 1 ? kOfSomeRays : 1);
     result.within = reach(choice.pictures, aim, kRaises, bits, proof);
-    if (result.within) take_back(choice.pictures, aim, kTakenBack, bits, proof);
+    if (result.within) {
+        take_back(choice.pictures, aim, kTakenBack, bits, proof);
+        narrow(choice.pictures, aim, bits, proof);
+    }
     for (int w = 0; w < kWires; ++w) {
         auto& own = scene.precision.override_[static_cast<std::size_t>(w)];
         if (!own) own = to_string(choice.spec(bits, static_cast<Wire>(w)));
@@ -131,18 +193,19 @@ AutoFormats choose_formats(Scene& scene, const std::shared_ptr<const Volume>& vo
     if (choice.pictures.every_view)
         result.notes.push_back(fmt::format(
             "precision auto: no pixel of any view errs by more than {:.3g} LSB8 by rounding (budget {:g}); "
-            "{:.0f} bits by the tally, `default` has {:.0f}",
-            proof.most, budget, result.bits, result.bits_of_default));
+            "{:.0f} bits by the tally, `default` has {:.0f}; {}",
+            proof.most, budget, result.bits, result.bits_of_default,
+            lanes_of(choice.pictures.plan(bits, 0))));
     else
         result.notes.push_back(fmt::format(
             "precision auto: no decided ray of {} errs by more than {:.3g} LSB8 by rounding (budget {:g}){}; "
             "{:.0f} bits by the "
-            "tally, `default` has {:.0f}",
+            "tally, `default` has {:.0f}; {}",
             proof.rays, proof.most, budget,
             result.one_in > 1
                 ? fmt::format(", one row and column in {}: --bound certifies all", result.one_in)
                 : "",
-            result.bits, result.bits_of_default));
+            result.bits, result.bits_of_default, lanes_of(choice.pictures.plan(bits, 0))));
     result.undecided = proof.undecided;
     if (proof.undecided > 0)
         result.warnings.push_back(

@@ -25,14 +25,18 @@ int least_of(const std::map<Wire, int>& least, Wire wire) {
     return found == least.end() ? 1 : found->second;
 }
 
-/// What no wire's bits can take away.
+int most_of(const std::map<Wire, int>& most, Wire wire) {
+    const auto found = most.find(wire);
+    return found == most.end() ? kMostChosenFractionBits : found->second;
+}
+
+}  // namespace
+
 double fixed_part(const Shares& greatest) {
     double sum = greatest[Shares::kElsewhere];
     for (int p = kWires; p < kPayers; ++p) sum += greatest[p];
     return sum;
 }
-
-}  // namespace
 
 std::map<Wire, int> least_bits(const Plan& plan) {
     // Below, slabs are cut into other pieces than without rounding.
@@ -41,7 +45,7 @@ std::map<Wire, int> least_bits(const Plan& plan) {
 }
 
 Bits equal_shares(const Shares& greatest, const Bits& bits, const std::map<Wire, int>& least,
-                  double most_error) {
+                  double most_error, const std::map<Wire, int>& most) {
     const auto share = [&](Wire wire) { return greatest[static_cast<int>(wire)]; };
     // Walls, rows and termination need not meet in one pixel.
     const double left = std::max(most_error - fixed_part(greatest), most_error / 8);
@@ -51,7 +55,7 @@ Bits equal_shares(const Shares& greatest, const Bits& bits, const std::map<Wire,
     for (auto& [wire, fraction] : wanted)
         if (share(wire) > 0)
             fraction = std::clamp(fraction + bits_for_ratio(payers * share(wire) / left),
-                                  least_of(least, wire), kMostChosenFractionBits);
+                                  least_of(least, wire), most_of(most, wire));
     return wanted;
 }
 
@@ -85,7 +89,7 @@ Proof prove(const Pictures& pictures, const Bits& bits) {
 bool reach(const Pictures& pictures, double most_error, int raises, Bits& bits, Proof& proof) {
     proof = prove(pictures, bits);
     for (int round = 0; round < kRounds; ++round) {
-        const Bits wanted = equal_shares(proof.greatest, bits, pictures.least, most_error);
+        const Bits wanted = equal_shares(proof.greatest, bits, pictures.least, most_error, pictures.most);
         if (wanted == bits) break;
         bits = wanted;
         proof = prove(pictures, bits);
@@ -96,7 +100,7 @@ bool reach(const Pictures& pictures, double most_error, int raises, Bits& bits, 
         int* best = nullptr;
         double most = 0;
         for (auto& [wire, fraction] : bits)
-            if (fraction < kMostChosenFractionBits && proof.worst[static_cast<int>(wire)] > most)
+            if (fraction < most_of(pictures.most, wire) && proof.worst[static_cast<int>(wire)] > most)
                 best = &fraction, most = proof.worst[static_cast<int>(wire)];
         if (!best) break;
         ++*best, proof = prove(pictures, bits);

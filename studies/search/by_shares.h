@@ -42,6 +42,7 @@ struct Pictures {
     std::function<Plan(const Bits&, std::size_t)> plan;  // throws InputError where no word holds them
     std::function<double(const Bits&)> cost;             // the tally's; throws alike
     std::map<Wire, int> least;                           // fraction bits that a wire keeps
+    std::map<Wire, int> most;                            // and is given
     bool decided_rays = false;  // prove nothing of rays that hang on a wall or on a gradient's direction
     CertificateOptions certificate;
     std::optional<SceneBoundOptions> every_view;  // bound all views of `count` scenes, not their pictures
