@@ -107,9 +107,80 @@ class DifferenceField {
     std::size_t axis_;
 };
 
+/// The spline's slope along `axis` is continuous over cell faces: how steep it is along each axis over cells.  With D the
+/// differences along the axis, its own change is straight in t, from 2 (D1 - D0) - (D2 - D1) to 2 (D2 - D1) - (D1 - D0);
+/// across, it changes by the slope of splines again.  Weights of four values sum to 5/4 in size at most, those of
+/// three differences to 3/2.
+inline std::array<double, 3> spline_steepness(const Volume& volume, const ReachedCells& cells, int axis) {
+    constexpr double kValues = 1.25, kSlopes = 1.5;
+    const auto a = static_cast<std::size_t>(axis), b = (a + 1) % 3, c = (a + 2) % 3;
+    const Index3& d = volume.dims;
+    std::array<double, 3> steepest{};
+    const auto of_cell = [&](const std::array<std::int64_t, 3>& cell) {
+        double difference[3][4][4];
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 4; ++j)
+                for (int k = 0; k < 4; ++k) {
+                    std::array<std::int64_t, 3> at{};
+                    at[a] = cell[a] - 1 + i, at[b] = cell[b] - 1 + j, at[c] = cell[c] - 1 + k;
+                    const auto value = [&] {
+                        return static_cast<double>(
+                            volume.at(voxel_at(at[0], d.x), voxel_at(at[1], d.y), voxel_at(at[2], d.z)));
+                    };
+                    const double here = value();
+                    ++at[a];
+                    difference[i][j][k] = value() - here;
+                }
+        for (int j = 0; j < 4; ++j)
+            for (int k = 0; k < 4; ++k) {
+                const double near = difference[1][j][k] - difference[0][j][k],
+                             far = difference[2][j][k] - difference[1][j][k];
+                const double along = std::max(std::abs(2 * near - far), std::abs(2 * far - near));
+                steepest[a] = std::max(steepest[a], kValues * kValues * along);
+                for (int i = 0; i < 3; ++i) {
+                    const double to = kSlopes * kSlopes * kValues, here = difference[i][j][k];
+                    if (j < 3)
+                        steepest[b] = std::max(steepest[b], to * std::abs(difference[i][j + 1][k] - here));
+                    if (k < 3)
+                        steepest[c] = std::max(steepest[c], to * std::abs(difference[i][j][k + 1] - here));
+                }
+            }
+    };
+    for (std::int64_t z = cells.low[2]; z <= cells.high[2]; ++z)
+        for (std::int64_t y = cells.low[1]; y <= cells.high[1]; ++y)
+            for (std::int64_t x = cells.low[0]; x <= cells.high[0]; ++x) of_cell({x, y, z});
+    return steepest;
+}
+inline Bounded bounded_spline(const GradientStage& s, const HWY_NAMESPACE::Neighbourhood<Bounded>& near,
+                              const std::array<Bounded, 3>& weight, int axis) {
+    struct Exact {
+        const HWY_NAMESPACE::Neighbourhood<Int128>& words;
+        Bounded at(int x, int y, int z) const { return {words.at(x, y, z), true, {}}; }
+    };
+    // Roundings, of the word's own place.
+    const std::array<Bounded, 3> place{Bounded{weight[0].v, true, {}}, Bounded{weight[1].v, true, {}},
+                                       Bounded{weight[2].v, true, {}}};
+    Bounded slope = HWY_NAMESPACE::spline_difference(s, Exact{near.words}, place, axis);
+    if (weight[0].exact && weight[1].exact && weight[2].exact) return slope;
+    const int fraction = 3 * s.spline_fraction - s.to_first.shift - s.to_second.shift - s.to_gradient.shift;
+    const double one = std::ldexp(1.0, fraction), whole = std::ldexp(1.0, s.weight_bits);
+    const ReachedCells cells = reached_cells(*near.volume, near.cell, weight, s.weight_bits);
+    slope.exact = false;
+    if (cells.far) {
+        const auto range = static_cast<double>(near.volume->largest - near.volume->smallest);
+        slope.error[Shares::kElsewhere] += 5 * range * one;  // 2 x 3/2 x (5/4)^2 of it
+        return slope;
+    }
+    const std::array<double, 3> steep = spline_steepness(*near.volume, cells, axis);
+    for (std::size_t i = 0; i < 3; ++i)
+        if (steep[i] > 0) slope.error.add(weight[i].error, steep[i] * one / whole);
+    return slope;
+}
+
 /// central and sobel lerp a field that is continuous over cell faces, as the samples' is; analytic jumps there.
 inline Bounded voxel_difference(const GradientStage& s, const HWY_NAMESPACE::Neighbourhood<Bounded>& near,
                                 const std::array<Bounded, 3>& weight, int axis) {
+    if (s.rule == GradientRule::cubic_spline) return bounded_spline(s, near, weight, axis);
     const Int128 word = HWY_NAMESPACE::voxel_difference(
         s, near.words, std::array<Int128, 3>{weight[0].v, weight[1].v, weight[2].v}, axis);
     const DifferenceField field(*near.volume, s.rule, axis);

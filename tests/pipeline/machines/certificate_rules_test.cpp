@@ -223,6 +223,49 @@ TEST(CertificateRules, OfAdaptivePiecesHoldAndHalvedDoNot) {
     EXPECT_GT(wrong_of_half, 0);
 }
 
+// The gradient of a spline where its place may be another: a quadratic field, and noise.
+TEST(CertificateRules, OfSplinesHoldAndHalvedDoNot) {
+    const Plan plan = plan_with({"shading.gradient=cubic_spline", "precision.preset=wide"}),
+               real = real_plan(plan);
+    const ProceduralField square{
+        "square", "", 8, 16, [](const Vec3& p) { return p.x * p.x; }, [](const Vec3&) { return Vec3(); }};
+    const int bits = plan.gradient.weight_bits;
+    const double whole = std::ldexp(1.0, bits);
+    Ratio ratio;
+    for (const ProceduralField* field : {&square, &noise_field()}) {
+        const Volume volume = make_procedural(*field, {9, 9, 9}, 8);
+        const BoundedVolume bounded{volume, bits};
+        const HWY_NAMESPACE::FromVolume exact{volume};
+        for (unsigned seed = 1; seed <= 3000; ++seed) {
+            Draw draw(seed);
+            std::array<Bounded, 3> cell, weight;
+            std::array<std::int64_t, 3> moved_cell{};
+            std::array<Exact, 3> moved;
+            for (std::size_t a = 0; a < 3; ++a) {
+                const std::int64_t at = draw.between(0, 7);
+                const double place = draw.one_of({0.0, draw.real(0, 1)}), off = draw.one_of({0.001, 0.05});
+                cell[a] = constant<Bounded>(at);
+                weight[a] = off_by(static_cast<std::int64_t>(place * whole), off * whole);
+                const double there = std::clamp(
+                    static_cast<double>(at) + in_double(weight[a].v) / whole + off * draw.one_of({-1.0, 1.0}),
+                    0.0, 8.0);
+                moved_cell[a] = std::min<std::int64_t>(static_cast<std::int64_t>(there), 7);
+                moved[a].v = (there - static_cast<double>(moved_cell[a])) * whole;
+            }
+            for (int axis = 0; axis < 3; ++axis) {
+                const Bounded slope =
+                    voxel_difference(plan.gradient, bounded.neighbourhood(cell), weight, axis);
+                std::array<Exact, 3> place;
+                for (std::size_t a = 0; a < 3; ++a) place[a].v = static_cast<double>(moved_cell[a]);
+                const double is =
+                    HWY_NAMESPACE::voxel_difference(real.gradient, exact.neighbourhood(place), moved, axis).v;
+                ratio.take(std::abs(is - in_double(slope.v)), slope.most());
+            }
+        }
+    }
+    ratio.check("splines");
+}
+
 // nlpi: the arc between two normals.
 TEST(CertificateRules, OfArcsHoldAndHalvedDoNot) {
     const Plan plan = plan_with({"shading.inside=nlpi", "precision.preset=wide"}), real = real_plan(plan);
