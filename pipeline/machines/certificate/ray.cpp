@@ -38,6 +38,8 @@ BoundedRay::BoundedRay(const Plan& plan, bool known) : s_(plan.compositing), kno
     color_unit_ = std::ldexp(1.0, -plan.specs[color].format.fraction_bits);
     for (const Entry& entry : plan.entries.entry)
         brightest_ = std::max({brightest_, entry.color.x, entry.color.y, entry.color.z});
+    // Colours that nothing in the slab dims are held to its opacity alone.
+    if (s_.premultiplied && plan.scene.classification.method != Method::pi2d) brightest_ = 1;
     if (plan.lit) brightest_ = brightest_lit(plan.scene.shading, brightest_);
 }
 
