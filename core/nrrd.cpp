@@ -309,26 +309,23 @@ std::size_t skip_lines(const MappedFile& file, std::size_t offset, unsigned line
 
 void take_data(StoredVolume& stored, const Parsed& parsed, const MappedFile& file, std::size_t start,
                const LoadLimits& limits, const std::string& where) {
-    std::size_t offset = skip_lines(file, start, parsed.io->lineSkip, where);
+    const std::size_t offset = skip_lines(file, start, parsed.io->lineSkip, where);
     const long skip = parsed.io->byteSkip;
+    if (skip < -1) throw InputError(fmt::format("{}: byte skip is {}, but must be -1 or more", where, skip));
+    const bool at_end = skip == -1;
+    const std::size_t bytes = at_end ? 0 : static_cast<std::size_t>(skip);
     if (parsed.io->encoding == nrrdEncodingGzip) {
-        if (skip < 0)
-            throw InputError(
-                fmt::format("{}: byte skip is {}, but must not be negative for gzip data", where, skip));
-        return take_inflated(stored, file, offset, file.size - offset, static_cast<std::size_t>(skip), limits,
-                             where);
+        const std::optional<std::size_t> before = at_end ? std::nullopt : std::optional(bytes);
+        return take_inflated(stored, file, offset, file.size - offset, before, limits, where);
     }
     if (parsed.io->encoding == nrrdEncodingAscii) {
-        if (skip > 0) offset += std::min(static_cast<std::size_t>(skip), file.size - offset);
-        return take_ascii(stored, file, offset, limits, where);
+        return take_ascii(stored, file, offset + std::min(bytes, file.size - offset), limits, where);
     }
     if (parsed.io->encoding != nrrdEncodingRaw)
         throw InputError(fmt::format("{}: encoding is {}, but raw, gzip and ascii are allowed", stored.where,
                                      parsed.io->encoding->name));
-    if (skip < -1) throw InputError(fmt::format("{}: byte skip is {}, but must be -1 or more", where, skip));
-    if (skip == -1 && file.size - offset >= stored.size())
-        return take_mapped(stored, file, file.size - stored.size(), where);  // at the file's end
-    const std::size_t bytes = skip > 0 ? static_cast<std::size_t>(skip) : 0;
+    if (at_end && file.size - offset >= stored.size())
+        return take_mapped(stored, file, file.size - stored.size(), where);
     take_mapped(stored, file, bytes < file.size - offset ? offset + bytes : file.size, where);
 }
 

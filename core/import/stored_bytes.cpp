@@ -12,6 +12,7 @@
 #include <cstring>
 #include <filesystem>
 #include <new>
+#include <vector>
 
 namespace squint {
 namespace {
@@ -107,9 +108,22 @@ std::string parse_numbers(const char* at, const char* end, std::size_t count, un
     return at == end ? "" : fmt::format("more than {} numbers", count);
 }
 
+/// How many inflated bytes come before the last `size`; counts no further than a skip may go.
+std::size_t bytes_before_the_last(std::size_t size, const unsigned char* packed, std::size_t packed_size,
+                                  const std::string& where) {
+    Inflater inflater(packed, packed_size, where);
+    std::vector<unsigned char> scratch(1 << 16);
+    std::size_t all = 0;
+    while (all <= size + kLongestSkip) {
+        const std::size_t got = inflater.read(scratch.data(), scratch.size());
+        if (got == 0) break;
+        all += got;
+    }
+    return all - std::min(all, size);
+}
+
 }  // namespace
 
-/// Bytes of a file made fit for a message: one line.
 std::string data_path(const std::string& path, const std::string& name) {
     const std::filesystem::path data(name);
     if (name == "LIST" || name.starts_with("LIST ") || name.find('%') != std::string::npos)
@@ -150,13 +164,16 @@ void take_mapped(StoredVolume& stored, const MappedFile& file, std::size_t offse
 }
 
 void take_inflated(StoredVolume& stored, const MappedFile& file, std::size_t offset, std::size_t packed,
-                   std::size_t skip, const LoadLimits& limits, const std::string& where) {
+                   std::optional<std::size_t> given_skip, const LoadLimits& limits,
+                   const std::string& where) {
     const std::size_t size = stored.size();
     if (size / kMostBytesPerDeflatedByte > packed)
         throw InputError(
             fmt::format("{}: {} bytes of compressed data hold at most {} bytes of voxels, but {}", where,
                         packed, packed * kMostBytesPerDeflatedByte, needs(stored)));
     check_memory(size, stored, limits);
+    const std::size_t skip =
+        given_skip ? *given_skip : bytes_before_the_last(size, file.bytes.get() + offset, packed, where);
     if (skip > kLongestSkip)
         throw InputError(
             fmt::format("{}: byte skip is {}, but at most {} is allowed", where, skip, kLongestSkip));

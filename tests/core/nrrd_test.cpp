@@ -213,6 +213,9 @@ TEST_F(Nrrd, SkipsLinesAndBytes) {
     EXPECT_EQ(with("byte skip: 5\n", "12345" + k24Bytes), expected);
     EXPECT_EQ(with("byte skip: -1\n", "anything" + k24Bytes), expected);
     EXPECT_EQ(with("byte skip: 5\n", gzip("12345" + k24Bytes), "gzip"), expected);
+    // The last bytes, after a header of another format (.nii.gz).
+    for (const std::size_t before : {0, 352, 100000})
+        EXPECT_EQ(with("byte skip: -1\n", gzip(std::string(before, 'x') + k24Bytes), "gzip"), expected);
 }
 
 TEST_F(Nrrd, BothByteOrdersGiveTheSameVolume) {
@@ -534,8 +537,11 @@ TEST_F(Nrrd, RefusesDataOfAnotherSize) {
         refusal_of(file("a.nrrd", Header{.encoding = "gzip", .more = "byte skip: 30\n"}.text() + packed)),
         HasSubstr("byte skip is 30, but the data end before"));
     EXPECT_THAT(
-        refusal_of(file("a.nrrd", Header{.encoding = "gzip", .more = "byte skip: -1\n"}.text() + packed)),
-        HasSubstr("must not be negative"));
+        refusal_of(file("a.nrrd", Header{.encoding = "gzip", .more = "byte skip: -2\n"}.text() + packed)),
+        HasSubstr("-1 or more"));
+    EXPECT_EQ(refusal_of(file("a.nrrd", Header{.encoding = "gzip", .more = "byte skip: -1\n"}.text() +
+                                            gzip(k24Bytes.substr(4)))),
+              "a.nrrd: 20 bytes of voxels, but 4x3x2 of 8 bits needs 24");
 }
 
 TEST_F(Nrrd, RefusesDamagedGzip) {
