@@ -107,7 +107,8 @@ Json conservation(const Prepared& point, const RenderOptions& options) {
 // Samples with opacity above zero that left T unchanged, on a grid of at most 32 x 32 rays.
 Json stuck_transparency(const Plan& plan) {
     constexpr int kRays = 32;
-    const int across = std::max(1, plan.camera.width / kRays), down = std::max(1, plan.camera.height / kRays);
+    const int across = (plan.camera.width + kRays - 1) / kRays,
+              down = (plan.camera.height + kRays - 1) / kRays;
     std::int64_t rays = 0, visible = 0, stuck = 0;
     for (int y = down / 2; y < plan.camera.height; y += down)
         for (int x = across / 2; x < plan.camera.width; x += across) {
