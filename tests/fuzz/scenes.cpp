@@ -34,6 +34,28 @@ std::string spec(FuzzedDataProvider& draw) {
     return text + kOverflow[draw.ConsumeIntegralInRange<int>(0, 2)];
 }
 
+/// Last, so that bytes found earlier keep their meaning; refused more often than not if each were drawn each time.
+void draw_what_few_scenes_set(FuzzedDataProvider& draw, Scene& scene) {
+    const auto now_and_then = [&] { return draw.ConsumeIntegralInRange<int>(0, 3) == 1; };
+    const auto unit = [&] { return draw.ConsumeProbability<double>(); };
+    if (now_and_then()) scene.sampling.interpolation = one_of<InterpolationRule>(draw);
+    if (now_and_then()) scene.sampling.lerp = one_of<LerpRule>(draw);
+    if (now_and_then()) scene.transfer_function.entries = draw.ConsumeIntegralInRange<int>(2, 64);
+    ClassificationSettings& classification = scene.classification;
+    if (now_and_then()) classification.order = draw.ConsumeIntegralInRange<int>(1, 5);
+    if (now_and_then()) classification.lookup = one_of<TableLookup>(draw);
+    if (now_and_then()) classification.encoding = one_of<AlphaEncoding>(draw);
+    if (now_and_then()) classification.opaque_prediction = one_of<WallRule>(draw);
+    if (now_and_then()) classification.as_printed = draw.ConsumeBool();
+    ShadingSettings& shading = scene.shading;
+    if (now_and_then()) shading.inside = one_of<InsideRule>(draw);
+    if (now_and_then()) shading.exaggeration = 7 * unit();
+    if (now_and_then()) shading.gradient_floor = 400 * unit();
+    if (now_and_then()) shading.cone_slope = one_of<ConeSlope>(draw);
+    if (now_and_then()) shading.cool_side = one_of<CoolSide>(draw);
+    if (now_and_then()) shading.ka = unit(), shading.kd = unit(), shading.ks = unit();
+}
+
 Scene scene_from(FuzzedDataProvider& draw) {
     static const char* const kVolumes[] = {"phantom",  "sphere", "marschner_lobb", "shells", "ramp",
                                            "constant", "fog"};
@@ -72,9 +94,13 @@ Scene scene_from(FuzzedDataProvider& draw) {
     scene.compositing.mode = one_of<CompositingMode>(draw),
     scene.compositing.form = one_of<CompositingForm>(draw);
     scene.output.depth = draw.ConsumeBool(), scene.output.normals = draw.ConsumeBool();
-    scene.precision.preset = kPrecisionPresets[draw.ConsumeIntegralInRange<std::size_t>(0, 5)];
+    // `auto` renders the picture many times over: it is none of the presets drawn.
+    static_assert(std::end(kPrecisionPresets)[-1] == "auto");
+    scene.precision.preset =
+        kPrecisionPresets[draw.ConsumeIntegralInRange<std::size_t>(0, std::size(kPrecisionPresets) - 2)];
     for (int i = draw.ConsumeIntegralInRange<int>(0, 3); i > 0; --i)
         scene.precision.override_[draw.ConsumeIntegralInRange<std::size_t>(0, kWires - 1)] = spec(draw);
+    draw_what_few_scenes_set(draw, scene);
     return scene;
 }
 
@@ -92,11 +118,22 @@ void check_picture(const Plan& plan, const Image& image) {
             if (image.find(name)->values[i] > alpha[i] + 1e-6F) std::abort();
 }
 
+/// Says at the end how many of the scenes were legal.
+struct Count {
+    std::int64_t drawn = 0, legal = 0;
+    ~Count() {
+        std::fprintf(stderr, "%lld scenes, %lld of them legal\n", static_cast<long long>(drawn),
+                     static_cast<long long>(legal));
+    }
+};
+
 }  // namespace
 }  // namespace squint::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace squint;
+    static fuzz::Count count;
+    ++count.drawn;
     FuzzedDataProvider draw(data, size);
     const Scene scene = fuzz::scene_from(draw);
     fuzz::read_or_refuse([&] {
@@ -108,6 +145,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         fuzz::check_picture(plan, model);
         options.path = Path::automatic;
         if (picture_hash(render(plan, options).image) != picture_hash(model)) std::abort();
+        ++count.legal;
     });
     return 0;
 }
