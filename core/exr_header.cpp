@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <iterator>
 #include <string_view>
 
 namespace squint {
@@ -20,6 +21,37 @@ constexpr std::uint64_t kFewPixels = 1 << 22;       // that any file may claim
 constexpr std::uint64_t kMostLinesPerChunk =
     256;  // of every compression; each chunk has an offset of 8 bytes
 constexpr std::uint64_t kFewLines = 1 << 16;
+
+/// Bytes of an attribute's value.  OpenEXR reads so many, whatever length the file gives, and then takes what follows
+/// for the next attribute.
+struct FixedType {
+    std::string_view name;
+    std::uint64_t bytes;
+};
+constexpr FixedType kFixedTypes[] = {{"box2i", 16},
+                                     {"box2f", 16},
+                                     {"chromaticities", 32},
+                                     {"compression", 1},
+                                     {"deepImageState", 1},
+                                     {"double", 8},
+                                     {"envmap", 1},
+                                     {"float", 4},
+                                     {"int", 4},
+                                     {"keycode", 28},
+                                     {"lineOrder", 1},
+                                     {"m33d", 72},
+                                     {"m33f", 36},
+                                     {"m44d", 128},
+                                     {"m44f", 64},
+                                     {"rational", 8},
+                                     {"tiledesc", 9},
+                                     {"timecode", 8},
+                                     {"v2d", 16},
+                                     {"v2f", 8},
+                                     {"v2i", 8},
+                                     {"v3d", 24},
+                                     {"v3f", 12},
+                                     {"v3i", 12}};
 
 class Header {
   public:
@@ -68,13 +100,54 @@ class Header {
         if (length > size_ - at_)
             refuse(fmt::format("attribute \"{}\" claims {} bytes, {} are left", excerpt(attribute), length,
                                size_ - at_));
+        check_length(attribute, type, length);
         if (attribute == "dataWindow" && length == 16) check_window();
         if (attribute == "tiles" && length >= 8) check_pixels("tile", number(at_), number(at_ + 4));
-        if (type == "preview" && length >= 8)
-            if (std::uint64_t{number(at_)} * number(at_ + 4) > length / 4)
-                refuse(fmt::format("its preview claims {} x {} pixels in {} bytes", number(at_),
-                                   number(at_ + 4), length));
         at_ += length;
+    }
+    /// An attribute's value ends where its length says.
+    void check_length(std::string_view attribute, std::string_view type, std::uint64_t length) const {
+        const auto* fixed = std::find_if(std::begin(kFixedTypes), std::end(kFixedTypes),
+                                         [&](const FixedType& f) { return f.name == type; });
+        if (fixed != std::end(kFixedTypes) && length != fixed->bytes)
+            refuse(fmt::format("attribute \"{}\" has {} bytes, but its type, {}, has {}", excerpt(attribute),
+                               length, type, fixed->bytes));
+        const bool ends = type == "chlist"         ? channels_end(at_ + length)
+                          : type == "stringvector" ? strings_end(at_ + length)
+                          : type == "floatvector"  ? length % sizeof(float) == 0
+                          : type == "preview"      ? preview_ends(length)
+                                                   : true;
+        if (!ends)
+            refuse(fmt::format("attribute \"{}\", of type {}, does not end after its {} bytes",
+                               excerpt(attribute), type, length));
+    }
+    /// A name, which zero ends, and 16 bytes each, up to an empty name.
+    bool channels_end(std::size_t end) const {
+        for (std::size_t at = at_; at < end;) {
+            const void* zero = std::memchr(bytes_ + at, 0, end - at);
+            if (!zero) return false;
+            const auto next = static_cast<std::size_t>(static_cast<const unsigned char*>(zero) - bytes_) + 1;
+            if (next == at + 1) return next == end;
+            at = next + 16;
+        }
+        return false;
+    }
+    /// A length and so many bytes each.
+    bool strings_end(std::size_t end) const {
+        std::size_t at = at_;
+        while (end - at >= 4) {
+            const std::uint64_t length = number(at);
+            at += 4;
+            if (length > end - at) return false;
+            at += length;
+        }
+        return at == end;
+    }
+    bool preview_ends(std::uint64_t length) const {
+        if (length < 8) return false;
+        const std::uint64_t width = number(at_), height = number(at_ + 4), pixels = (length - 8) / 4;
+        return (length - 8) % 4 == 0 &&
+               (width == 0 ? pixels == 0 : pixels % width == 0 && pixels / width == height);
     }
     void check_window() const {
         const auto extent = [&](std::size_t axis) {

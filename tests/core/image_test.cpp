@@ -1,6 +1,7 @@
 #include "core/image.h"
 
 #include "core/error.h"
+#include "core/exr_header.h"
 #include "core/srgb.h"
 
 #include <gmock/gmock.h>
@@ -253,6 +254,77 @@ TEST(ReadImage, AnExrThatClaimsMoreThanItHoldsIsRefusedBeforeMemoryIsTaken) {
     put(wide, window + 4, 0x80000000), put(wide, window + 12, 0x7fffffff);
     EXPECT_THAT(refused(wide), HasSubstr("4294967296 x 4294967296 pixels"));
     EXPECT_LT(most_resident_kilobytes() - before, 64 << 10);
+}
+
+std::string word(std::uint32_t number) {
+    std::string bytes(4, 0);
+    put(bytes, 0, number);
+    return bytes;
+}
+
+// OpenEXR reads an attribute by its type, whatever length the file gives, and takes what follows for the next one: so
+// a list of channels that is longer than said made it ask for 1.8 GB, for a file of 400 bytes.
+TEST(ReadImage, AnExrAttributeThatDoesNotEndWhereItSaysIsRefused) {
+    using namespace std::string_literals;
+    const Folder folder;
+    write_exr(picture(), folder / "whole.exr", {});
+    const std::string whole = bytes_of(folder / "whole.exr");
+    const auto refusal = [&](const std::string& type, const std::string& value) {
+        const std::string bytes = whole.substr(0, 8) + "more\0"s + type + '\0' +
+                                  word(static_cast<std::uint32_t>(value.size())) + value + whole.substr(8);
+        return message([&] {
+            check_exr_header(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size(), "a.exr");
+        });
+    };
+    const std::string zeros(200, '\0');
+    for (const auto& [type, bytes] : {std::pair{"box2i", 16},
+                                      {"box2f", 16},
+                                      {"chromaticities", 32},
+                                      {"compression", 1},
+                                      {"double", 8},
+                                      {"envmap", 1},
+                                      {"float", 4},
+                                      {"int", 4},
+                                      {"keycode", 28},
+                                      {"lineOrder", 1},
+                                      {"m33f", 36},
+                                      {"m44f", 64},
+                                      {"rational", 8},
+                                      {"tiledesc", 9},
+                                      {"timecode", 8},
+                                      {"v2f", 8},
+                                      {"v2i", 8},
+                                      {"v3f", 12},
+                                      {"v3i", 12}}) {
+        const auto size = static_cast<std::size_t>(bytes);
+        EXPECT_EQ(refusal(type, zeros.substr(0, size)), "") << type;
+        for (const std::size_t wrong : {size - 1, size + 1})
+            EXPECT_THAT(refusal(type, zeros.substr(0, wrong)), HasSubstr("but its type, "s + type)) << wrong;
+    }
+    const std::string channel = "R\0"s + zeros.substr(0, 16);
+    const std::string pixels = word(2) + word(3) + zeros.substr(0, 24);
+    for (const auto& [type, value] : {std::pair{"chlist", channel + '\0'},
+                                      {"stringvector", word(2) + "ab" + word(0)},
+                                      {"stringvector", ""s},
+                                      {"floatvector", zeros.substr(0, 8)},
+                                      {"preview", pixels},
+                                      {"preview", word(0) + word(7)},
+                                      {"string", "any"s},
+                                      {"of somebody", "any"s}})
+        EXPECT_EQ(refusal(type, value), "") << type;
+    for (const auto& [type, value] : {std::pair{"chlist", channel},
+                                      {"chlist", channel + channel.substr(0, 9)},
+                                      {"chlist", ""s},
+                                      {"chlist", channel + '\0' + channel},
+                                      {"chlist", "R"s},
+                                      {"stringvector", word(3) + "ab"},
+                                      {"stringvector", word(1) + "abc"},
+                                      {"floatvector", zeros.substr(0, 7)},
+                                      {"preview", pixels + 'x'},
+                                      {"preview", pixels.substr(0, 28)},
+                                      {"preview", word(2)},
+                                      {"preview", word(0x80000000) + word(2)}})
+        EXPECT_THAT(refusal(type, value), HasSubstr("does not end after its")) << type;
 }
 
 TEST(ReadImage, APictureKnowsItsPlaceAndSeveralInAFileAreRefused) {
