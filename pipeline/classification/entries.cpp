@@ -81,7 +81,11 @@ InputStage build_input(const StageInputs& in) {
             ? static_cast<std::int64_t>(std::floor(s.scale_exact * std::ldexp(1.0, s.scale_fraction) + 0.5))
             : 1;
     s.to_input = rescale(in, fraction(in, Wire::sample) + s.scale_fraction, Wire::classification_input);
-    s.highest = static_cast<std::int64_t>(in.entries.size() - 1) << fraction(in, Wire::classification_input);
+    // The last entry, or where no voxel comes near it and the format ends before, its end: lanes as narrow as the
+    // format hold the limit, too.
+    const Format input = in.specs[Wire::classification_input].format;
+    s.highest =
+        std::min(static_cast<std::int64_t>(in.entries.size() - 1) << input.fraction_bits, input.largest());
     return s;
 }
 

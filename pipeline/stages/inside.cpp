@@ -66,8 +66,9 @@ InsideStage build_inside(const StageInputs& in, const LocationStage& location) {
     for (std::size_t a = 0; a < 3; ++a)
         s.most_apart[a] =
             static_cast<std::int64_t>(std::min(static_cast<double>(s.limit[a]), std::ceil(apart * one)));
-    s.highest_input = static_cast<std::int64_t>(in.entries.size() - 1)
-                      << fraction(in, Wire::classification_input);
+    const Format input = in.specs[Wire::classification_input].format;  // as InputStage::highest
+    s.highest_input =
+        std::min(static_cast<std::int64_t>(in.entries.size() - 1) << input.fraction_bits, input.largest());
     s.one_alpha = in.specs[Wire::slab_alpha].format.one();
     s.lit = in.lit, s.premultiplied = in.premultiplied;
     s.color_wire = in.lit ? Wire::lit_color : in.premultiplied ? Wire::slab_color : Wire::slab_ratio;

@@ -10,6 +10,7 @@
 #include "pipeline/record.h"
 #include "pipeline/render.h"
 #include "tests/pipeline/machines/draw.h"
+#include "tests/truth/reference_cases.h"
 
 #include <gtest/gtest.h>
 
@@ -345,6 +346,33 @@ TEST(SameBits, RandomScenesHaveTheModelsBitsOnEveryPath) {
 // The model of float32 lanes is the scalar float.
 TEST(SameBits, RandomScenesInFloat32HaveTheModelsBitsOnEveryPath) {
     compare_random_scenes(300, "float32");
+}
+
+// Voxels of the first entries alone, in a format that ends before the last entry: the limit of an input, which is the
+// last entry elsewhere, would not fit lanes of 32 bits.
+TEST(SameBits, FormatsThatEndBeforeTheLastEntryHaveTheModelsBits) {
+    const auto volume =
+        cases::volume_of({6, 6, 6}, 10, Vec3(1), [](const Index3& p) { return (p.x + p.y * p.z) % 3 == 0; });
+    int in_lanes = 0;
+    for (const char* input : {"s1.22 wrap", "u1.29", "u2.24", "s3.20", "u4.20 wrap"})
+        for (const char* mode : {"over", "minip", "mip", "average"})
+            for (const char* method : {"pc", "pips", "leg", "pi2d", "pi1d"}) {
+                Scene scene = scene_with(
+                    built_in_scene(),
+                    {"image.width=9", "image.height=7", "camera.height=7", "classification.table_size=64",
+                     "transfer_function.points=[[0,1,0.5,0,0.1],[1,0,1,0.5,0.9],[2,1,1,1,0],[1023,1,0,0,1]]",
+                     "transfer_function.unit_distance=1", std::string("compositing.mode=") + mode,
+                     std::string("classification.method=") + method,
+                     std::string("precision.classification_input=") + input});
+                const Plan plan = make_plan(scene, volume);
+                RenderOptions golden;
+                golden.path = Path::model, golden.skip = false;
+                const Rendering fast = render(plan);
+                in_lanes += fast.statistics.path == "lanes";
+                EXPECT_EQ(first_difference(render(plan, golden).image, fast.image), "")
+                    << input << ' ' << mode << ' ' << method << ' ' << fast.statistics.why;
+            }
+    EXPECT_GT(in_lanes, 50);
 }
 
 // Doubles run in the model, which leaves out what lanes would: whole plans of doubles, and those with one stage
