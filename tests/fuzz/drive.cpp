@@ -1,7 +1,8 @@
 // Runs a fuzz target where there is no libFuzzer: mutated seeds, the same ones for a seed's number wherever it runs.
 //
-//     fuzz_NAME [-runs=N] [-seed=N] [-max_len=N] [other flags of libFuzzer, not heard] FOLDER...
+//     fuzz_NAME [-runs=N] [-seed=N] [-max_len=N] [-random_bytes=N] [other flags of libFuzzer, not heard] FOLDER...
 //
+// -random_bytes: after the seeds, so many random bytes instead of a mutated seed, for targets that draw from them.
 // It looks at no coverage: tools/fuzz, with libFuzzer, finds more.  What ends the program is written to crash-NAME.
 #include <fcntl.h>
 #include <unistd.h>
@@ -42,6 +43,11 @@ class Mutator {
     Mutator(std::vector<Bytes> seeds, unsigned seed, std::size_t longest)
         : seeds_(std::move(seeds)), random_(seed), longest_(longest) {}
 
+    Bytes random_bytes(std::size_t count) {
+        Bytes bytes(count, '\0');
+        for (char& byte : bytes) byte = static_cast<char>(below(256));
+        return bytes;
+    }
     Bytes next() {
         Bytes bytes = any_seed();
         for (std::size_t changes = 1 + below(5); changes > 0; --changes) change(bytes);
@@ -131,7 +137,7 @@ int main(int argc, char** argv) {
     namespace fs = std::filesystem;
     long runs = 10000;
     unsigned seed = 1;
-    std::size_t longest = 8192;
+    std::size_t longest = 8192, random_bytes = 0;
     std::vector<Bytes> seeds{""};
     for (int i = 1; i < argc; ++i) {
         const std::string argument = argv[i];
@@ -141,6 +147,7 @@ int main(int argc, char** argv) {
         if (argument.starts_with("-runs=")) runs = number();
         if (argument.starts_with("-seed=")) seed = static_cast<unsigned>(number());
         if (argument.starts_with("-max_len=")) longest = static_cast<std::size_t>(number());
+        if (argument.starts_with("-random_bytes=")) random_bytes = static_cast<std::size_t>(number());
         if (argument.starts_with('-')) continue;
         std::vector<fs::path> files{argument};
         if (fs::is_directory(argument))
@@ -156,7 +163,9 @@ int main(int argc, char** argv) {
         std::signal(signal, write_input);
     Mutator mutator(seeds, seed, longest);
     for (long run = 0; run < runs; ++run) {
-        input = run < static_cast<long>(seeds.size()) ? seeds[static_cast<std::size_t>(run)] : mutator.next();
+        input = run < static_cast<long>(seeds.size()) ? seeds[static_cast<std::size_t>(run)]
+                : random_bytes > 0                    ? mutator.random_bytes(random_bytes)
+                                                      : mutator.next();
         alarm(20);  // what takes longer is a fault, too
         LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(input.data()), input.size());
     }
