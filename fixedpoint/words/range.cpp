@@ -67,10 +67,19 @@ Range shift_left(Range x, int bits) {
 Range floor_shift(Range x, int bits) {
     return {x.low >> bits, x.high >> bits};
 }
+namespace {
+// A limit that no value comes near is a word all the same: lanes must hold it to compare with it.
+void note_limits(Range a, Range b) {
+    for (const Range& x : {a, b})
+        if (x.low == x.high) noted(x);
+}
+}  // namespace
 Range min(Range a, Range b) {
+    note_limits(a, b);
     return {std::min(a.low, b.low), std::min(a.high, b.high)};
 }
 Range max(Range a, Range b) {
+    note_limits(a, b);
     return {std::max(a.low, b.low), std::max(a.high, b.high)};
 }
 Range absolute(Range x) {

@@ -12,6 +12,7 @@
 #include "tests/pipeline/machines/draw.h"
 #include "tests/truth/reference_cases.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -373,6 +374,29 @@ TEST(SameBits, FormatsThatEndBeforeTheLastEntryHaveTheModelsBits) {
                     << input << ' ' << mode << ' ' << method << ' ' << fast.statistics.why;
             }
     EXPECT_GT(in_lanes, 50);
+}
+
+// A length up to which light fades in that no gradient of the format reaches.
+TEST(SameBits, LimitsThatNoGradientReachesHaveTheModelsBits) {
+    const auto volume =
+        cases::volume_of({7, 7, 7}, 7, Vec3(1), [](const Index3& p) { return (5 * p.x + p.y * p.z) % 16; });
+    for (const char* gradient : {"s6.23 trn", "s4.26", "s5.20"})
+        for (const double floor : {1.0, 391.5, 60000.0})
+            for (const char* model : {"gooch", "blinn_phong"}) {
+                const Scene scene = scene_with(
+                    built_in_scene(),
+                    {"image.width=9", "image.height=7", "camera.height=8", "classification.method=pc",
+                     "transfer_function.points=[[0,1,0.5,0,0.1],[8,0,1,0.5,0.5],[127,1,1,1,0.1]]",
+                     "transfer_function.unit_distance=1", std::string("shading.model=") + model,
+                     fmt::format("shading.gradient_floor={}", floor),
+                     std::string("precision.gradient=") + gradient});
+                const Plan plan = make_plan(scene, volume);
+                RenderOptions golden;
+                golden.path = Path::model, golden.skip = false;
+                const Rendering fast = render(plan);
+                EXPECT_EQ(first_difference(render(plan, golden).image, fast.image), "")
+                    << gradient << ' ' << floor << ' ' << model << ' ' << fast.statistics.why;
+            }
 }
 
 // Doubles run in the model, which leaves out what lanes would: whole plans of doubles, and those with one stage
