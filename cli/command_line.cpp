@@ -38,7 +38,8 @@ Flag& Flag::not_negative() {
     return option_->check(CLI::NonNegativeNumber), *this;
 }
 Flag& Flag::separated_by_commas() {
-    return option_->delimiter(','), *this;
+    // One word, so that what follows is another argument.
+    return option_->delimiter(',')->allow_extra_args(false), *this;
 }
 Flag& Flag::value_may_be_left_out() {
     return option_->expected(0, 1), *this;

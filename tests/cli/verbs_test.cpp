@@ -361,7 +361,7 @@ TEST_F(HardVerb, WithoutArgumentsTakesTheShippedCases) {
 TEST_F(HardVerb, ViewsAreWholePicturesAndTheWorstIsNamed) {
     const std::string scene = SQUINT_SOURCE_DIR "/configs/hard/spike.toml";
     const auto found =
-        squint("hard " + scene + " --views 3 --sizes 5,7 --json").json()["scenes"]["spike"]["pips 2"];
+        squint("hard --views 3 --sizes 5,7 " + scene + " --json").json()["scenes"]["spike"]["pips 2"];
     ASSERT_GT(found["rounding_lsb8"], 0.001);
     const std::string size = std::to_string(found["size"].get<int>()),
                       picture = fmt::format(
