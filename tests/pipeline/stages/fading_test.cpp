@@ -201,16 +201,20 @@ TEST(FadingLight, OfQuartersIsThePapersToo) {
     }
 }
 
-TEST(FadingLight, OfQuartersSumsToTheSlab) {
+/// Calls light_of(plan, front, back, length) for random slabs, now and then a point, of a function with a wall and of
+/// one without: the wall ends some.
+template <class LightOf>
+void expect_parts(const std::vector<std::string>& method, const LightOf& light_of) {
     for (const char* rule : {"linear", "nlpi"})
-        for (const char* points :
-             {"[[0,1,0.2,0,0],[1000,0,1,0.4,0.3],[2500,0.5,0.5,1,0.9],[4095,1,1,1,0.1]]",
-              "[[0,1,0.2,0,0],[1000,0,1,0.4,0.3],[2015,0.5,0.5,1,1],[2500,1,1,1,0.1]]"}) {
-            const Plan plan = plan_of(rule, 1, "default",
-                                      {std::string("transfer_function.points=") + points,
-                                       "classification.method=pips", "classification.order=1"});
-            const auto& method = std::get<PowerSeriesOfOrder1>(plan.method);
-            std::mt19937_64 random(12);
+        for (const bool has_wall : {false, true}) {
+            std::vector<std::string> settings = method;
+            settings.push_back(
+                has_wall ? "transfer_function.points="
+                           "[[0,1,0.2,0,0],[1000,0,1,0.4,0.3],[2015,0.5,0.5,1,1],[2500,1,1,1,0.1]]"
+                         : "transfer_function.points="
+                           "[[0,1,0.2,0,0],[1000,0,1,0.4,0.3],[2500,0.5,0.5,1,0.9],[4095,1,1,1,0.1]]");
+            const Plan plan = plan_of(rule, 1, "default", settings);
+            std::mt19937_64 random(11);
             const auto below = [&](Word end) {
                 return static_cast<Word>(random() % static_cast<std::uint64_t>(end));
             };
@@ -220,21 +224,34 @@ TEST(FadingLight, OfQuartersSumsToTheSlab) {
                            back = i % 16 == 0 ? front : below(plan.input.highest + 1);
                 const Word full = Word{1} << plan.location.length_fraction;
                 const Word length = i % 3 == 0 ? 1 + below(full) : full;
-                const Slab<Word> slab = classify(method, front, back, length);
-                const FadingLight<Word> light = fades_of(plan, method, front, back, length, slab);
-                for (std::size_t c = 0; c < 4; ++c) {
-                    Word sum = 0;
-                    for (int k = 0; k < light.count; ++k) {
-                        ASSERT_GE(light.part[static_cast<std::size_t>(k)][c], 0);
-                        sum += light.part[static_cast<std::size_t>(k)][c];
-                    }
-                    ASSERT_EQ(sum, c < 3 ? slab.color[c] : method.one_ratio)
-                        << front << ' ' << back << ' ' << length;
-                }
+                const FadingLight<Word> light = light_of(plan, front, back, length);
+                ASSERT_EQ(light.count, std::string(rule) == "linear" ? 2 : 4);
                 walls += light.end < Word{1} << kWayBits;
             }
-            EXPECT_EQ(walls > 0, std::string(points).find("1,1]") != std::string::npos);
+            EXPECT_EQ(walls > 0, has_wall);
         }
+}
+/// The sum of the parts of a channel, or of white, none of which is below zero.
+Word sum_of_parts(const FadingLight<Word>& light, std::size_t channel) {
+    Word sum = 0;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(light.count); ++k) {
+        EXPECT_GE(light.part[k][channel], 0);
+        sum += light.part[k][channel];
+    }
+    return sum;
+}
+
+TEST(FadingLight, OfQuartersSumsToTheSlab) {
+    expect_parts({"classification.method=pips", "classification.order=1"},
+                 [](const Plan& plan, Word front, Word back, Word length) {
+                     const auto& method = std::get<PowerSeriesOfOrder1>(plan.method);
+                     const Slab<Word> slab = classify(method, front, back, length);
+                     const FadingLight<Word> light = fades_of(plan, method, front, back, length, slab);
+                     for (std::size_t c = 0; c < 4; ++c)
+                         EXPECT_EQ(sum_of_parts(light, c), c < 3 ? slab.color[c] : method.one_ratio)
+                             << front << ' ' << back << ' ' << length;
+                     return light;
+                 });
 }
 
 // A wall's place is that of its entry on the way.
@@ -268,41 +285,19 @@ TEST(FadingLight, InWordsErrsByAFewLastBits) {
 
 // Parts are taken from the slab itself: whatever is rounded, and wherever a wall or a ray's end cuts it.
 TEST(FadingLight, PartsSumToTheSlab) {
-    for (const char* rule : {"linear", "nlpi"})
-        for (const char* points :
-             {"[[0,1,0.2,0,0],[1000,0,1,0.4,0.3],[2500,0.5,0.5,1,0.9],[4095,1,1,1,0.1]]",
-              "[[0,1,0.2,0,0],[1000,0,1,0.4,0.3],[2015,0.5,0.5,1,1],[2500,1,1,1,0.1]]"}) {
-            const Plan plan =
-                plan_of(rule, 1, "default", {std::string("transfer_function.points=") + points});
-            const auto& method = std::get<PreIntegrated2D>(plan.method);
-            std::mt19937_64 random(11);
-            const auto below = [&](Word end) {
-                return static_cast<Word>(random() % static_cast<std::uint64_t>(end));
-            };
-            int walls = 0;
-            for (int i = 0; i < 20'000; ++i) {
-                const Word front = below(plan.input.highest + 1),
-                           back = i % 16 == 0 ? front : below(plan.input.highest + 1);
-                const Word full = Word{1} << plan.location.length_fraction;
-                const Word length = i % 3 == 0 ? 1 + below(full) : full;
-                const Slab<Word> slab = classify(method, front, back, length);
-                const FadingLight<Word> light = fading_light(method, front, back, length, slab);
-                ASSERT_EQ(light.count, rule == std::string("linear") ? 2 : 4);
-                for (std::size_t c = 0; c < 4; ++c) {
-                    Word sum = 0;
-                    for (int k = 0; k < light.count; ++k) {
-                        ASSERT_GE(light.part[static_cast<std::size_t>(k)][c], 0);
-                        sum += light.part[static_cast<std::size_t>(k)][c];
-                    }
-                    const Word all = c < 3 ? slab.color[c] : largest_color(method.premultiplied, slab.alpha);
-                    // A point is its own matter's; the cell's beside it may be brighter by roundings.
-                    ASSERT_TRUE(sum == all || (front == back && std::abs(sum - all) < 64))
-                        << front << ' ' << back << ' ' << length << ": " << sum << ", not " << all;
-                }
-                walls += light.end < Word{1} << kWayBits;
-            }
-            EXPECT_EQ(walls > 0, std::string(points).find("1,1]") != std::string::npos);
+    expect_parts({}, [](const Plan& plan, Word front, Word back, Word length) {
+        const auto& method = std::get<PreIntegrated2D>(plan.method);
+        const Slab<Word> slab = classify(method, front, back, length);
+        const FadingLight<Word> light = fading_light(method, front, back, length, slab);
+        for (std::size_t c = 0; c < 4; ++c) {
+            const Word sum = sum_of_parts(light, c),
+                       all = c < 3 ? slab.color[c] : largest_color(method.premultiplied, slab.alpha);
+            // A point is its own matter's; the cell's beside it may be brighter by roundings.
+            EXPECT_TRUE(sum == all || (front == back && std::abs(sum - all) < 64))
+                << front << ' ' << back << ' ' << length << ": " << sum << ", not " << all;
         }
+        return light;
+    });
 }
 
 TEST(FadingLight, AZeroNormalTakesTheOthers) {
