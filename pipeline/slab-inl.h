@@ -124,7 +124,7 @@ HWY_INLINE Slab<W> either(const Mask& twice, const Slab<W>& looked, const Slab<W
 
 /// Stage 3: a raw gradient turned from the mean of those about its place.
 template <class W, class Voxels>
-std::array<W, 3> exaggerated_gradient(const Plan& plan, const Voxels& voxels, const std::array<W, 3>& cell,
+std::array<W, 3> exaggerated_gradient(const Plan& plan, Voxels& voxels, const std::array<W, 3>& cell,
                                       const std::array<W, 3>& weight, const std::array<W, 3>& gradient) {
     const GradientStage& boxes = plan.box_gradient;
     const Neighbourhood<W> sums = voxels.box_sums(cell);

@@ -328,7 +328,8 @@ void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& 
     if (looks_into_slabs(plan_.inside.rule) || walls_)
         w.picked = w.pieces = {}, w.cut = {}, w.slab_light = {};
     if (walls_) w.twice = {};
-    PacketLoop loop(plan_, kernels_, schedule_, voxels_, empty_.get(), walls_.get(), w);
+    BoxSums box_sums(*plan_.volume);
+    PacketLoop loop(plan_, kernels_, schedule_, voxels_, empty_.get(), walls_.get(), &box_sums, w);
     const bool colors_alone = !plan_.projection_mode && image.channels.size() == 4;
     for (int y = top; y < bottom; y += kSide)
         for (int x = left; x < right; x += kSide) {

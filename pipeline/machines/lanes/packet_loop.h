@@ -76,13 +76,15 @@ Pixel<W> finished(const PixelPacket& pixels, int r, Pixel<W> pixel = {}) {
 class PacketLoop {
   public:
     PacketLoop(const Plan& plan, const StageKernels& kernels, const Schedule& schedule,
-               const VoxelSource& voxels, const EmptySpace* empty, const NearWalls* walls, Workspace& w)
+               const VoxelSource& voxels, const EmptySpace* empty, const NearWalls* walls, BoxSums* box_sums,
+               Workspace& w)
         : plan_(plan),
           kernels_(kernels),
           schedule_(schedule),
           voxels_(voxels),
           empty_(empty),
           walls_(walls),
+          box_sums_(box_sums),
           w_(w),
           backwards_(plan.compositing.form == CompositingForm::back_to_front && !plan.projection_mode),
           notes_((plan.wants_depth || plan.scene.output.normals) && !plan.projection_mode) {}
@@ -321,7 +323,7 @@ class PacketLoop {
     void find_gradients(int count, LitSamples& lit) {
         look_around(count, lit);
         kernels_.find_gradients(plan_, count, lit);
-        if (plan_.gradient.exaggerated.wanted) exaggerate(plan_, count, lit);
+        if (plan_.gradient.exaggerated.wanted) exaggerate(plan_, count, *box_sums_, lit);
     }
     // Its second half, and stage 5.
     void shade(int count, LitSamples& lit) {
@@ -489,6 +491,7 @@ class PacketLoop {
     const VoxelSource& voxels_;
     const EmptySpace* empty_;
     const NearWalls* walls_;
+    BoxSums* box_sums_;  // where normals are exaggerated
     Workspace& w_;
     bool backwards_;
     bool notes_;                // depth or normals are asked for
