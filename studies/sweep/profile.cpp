@@ -37,7 +37,7 @@ std::string answer_text(const Plan& plan, const Json& audit, const Proof& proof)
         if (wire["saturated"].get<std::int64_t>() + wire["wrapped"].get<std::int64_t>() > 0)
             overflow += (overflow.empty() ? "" : ", ") + name;
         if (!wire.contains("enough")) continue;
-        const auto width = [&](const char* key) {
+        const auto width = [&wire = wire](const char* key) {
             Spec spec;
             parse_spec(wire[key].get<std::string>(), spec);
             return spec.format.width();

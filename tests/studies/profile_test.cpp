@@ -51,7 +51,7 @@ TEST(Profile, FormatsThatAreEnoughKeepTheBudgetAndOverflowNowhere) {
             if (!wire.contains("enough")) continue;
             held += width_of(wire["format"]), enough += width_of(wire["enough"]);
             const auto at = std::find_if(kWireInfo.begin(), kWireInfo.end(),
-                                         [&](const WireInfo& w) { return w.name == name; });
+                                         [&name = name](const WireInfo& w) { return w.name == name; });
             ASSERT_NE(at, kWireInfo.end()) << name;
             scene.precision.override_[static_cast<std::size_t>(at - kWireInfo.begin())] =
                 wire["enough"].get<std::string>();
