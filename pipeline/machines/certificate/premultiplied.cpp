@@ -128,8 +128,8 @@ Slab<Bounded> classify_within(const Method& m, const Bounded& front, const Bound
             } else {
                 decided_walls = false;
                 SlabReach any{{}, {0, 1}};
-                for (std::size_t c = 0; c < 3; ++c)
-                    any.color[c] = {0, std::max(f.over(c, s.low, s.high).high, color_here[c])};
+                // Colours that nothing dims pass the curve's own, up to the opacity.
+                for (Reach& color : any.color) color = {0, 1};
                 reach.take(any);
             }
         }

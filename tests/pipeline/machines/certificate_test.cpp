@@ -192,6 +192,15 @@ TEST(LitCertificate, IsExceededByNoPixelOfPicturesDrawnAtRandom) {
     draw_pictures(true);
 }
 
+// Where a wall may be missed, and nothing dims a slab's colours: brighter than any entry.
+TEST(Certificate, KnowsThatColoursWhichNothingDimsPassTheCurves) {
+    const Case c = draw_case(3261);
+    ASSERT_EQ(c.scene.classification.method, Method::pi2d_no_attenuation);
+    const Compared all = compared(c.plan);
+    EXPECT_EQ(all.over, "");
+    EXPECT_GT(all.error, 230) << "or the case is none any more";
+}
+
 /// A scene of configs/, unlit and by PC, with its own volume.
 Plan plan_of(const std::string& file, std::vector<std::string> overrides) {
     overrides.insert(overrides.begin(), {"lights=[]", "classification.method=pc"});
