@@ -14,6 +14,7 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
+#include <vector>
 
 namespace squint::lanes {
 
@@ -163,10 +164,16 @@ class PacketLoop {
     }
 
     void run_backwards() {
-        for (int end = w_.rays.most_slabs; end > 0; end -= kSteps) {
-            const int k = std::max(0, end - kSteps);
-            batch({k, end - k}, {k, 0}, false);
+        batches_.clear();
+        for (Rows rows = next_rows(0); rows.count > 0; rows = next_rows(rows.end())) batches_.push_back(rows);
+        int end = w_.rays.most_slabs;  // of the slabs still to come
+        for (std::size_t i = batches_.size(); i-- > 0;) {
+            const Rows rows = batches_[i];
+            kernels_.pass_over(w_.rays, rows.end(), end, w_.pixels);
+            batch(rows, i > 0 ? batches_[i - 1] : Rows{0, 0}, false);
+            end = rows.first;
         }
+        kernels_.pass_over(w_.rays, 0, end, w_.pixels);
     }
 
     // Slabs between two batches composite nothing, but count as composited, as in the model.
@@ -494,8 +501,9 @@ class PacketLoop {
     BoxSums* box_sums_;  // where normals are exaggerated
     Workspace& w_;
     bool backwards_;
-    bool notes_;                // depth or normals are asked for
-    int lit_ = 0, looked_ = 0;  // slabs of the batch at hand: those lit, those looked at twice
+    bool notes_;                 // depth or normals are asked for
+    int lit_ = 0, looked_ = 0;   // slabs of the batch at hand: those lit, those looked at twice
+    std::vector<Rows> batches_;  // of a packet, where the last is the first
     int current_ = 0;
     int located_ = -1;    // first slab of the batch whose locations are in the other buffer
     int last_count_ = 0;  // slabs of the last batch

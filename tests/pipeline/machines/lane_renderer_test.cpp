@@ -109,16 +109,26 @@ TEST(LaneRenderer, ProjectsMipMinipAndAverage) {
                      std::string("compositing.form=") + form});
 }
 
-TEST(LaneRenderer, LeavesOutWhatCannotBeAMaximumThatIsSeen) {
-    const std::vector<std::string> mip{"volume.procedural=shells", "volume.dims=64", "image.width=32",
-                                       "image.height=32", "compositing.mode=mip"};
+void expect_skipping_to_change_no_bit(const std::vector<std::string>& settings) {
     RenderOptions options;
     options.path = Path::lanes;
-    const Rendering skipped = rendered(mip, options);
+    const Rendering skipped = rendered(settings, options);
     options.skip = false;
-    const Rendering all = rendered(mip, options);
+    const Rendering all = rendered(settings, options);
     EXPECT_EQ(picture_hash(skipped.image), picture_hash(all.image));
+    EXPECT_EQ(skipped.statistics.samples, all.statistics.samples);
     EXPECT_LT(skipped.statistics.visited, all.statistics.visited);
+}
+TEST(LaneRenderer, LeavesOutWhatCannotBeAMaximumThatIsSeen) {
+    expect_skipping_to_change_no_bit({"volume.procedural=shells", "volume.dims=64", "image.width=32",
+                                      "image.height=32", "compositing.mode=mip"});
+}
+TEST(LaneRenderer, LeavesOutEmptySpaceBackToFront) {
+    for (const char* method : {"pc", "pips"})
+        expect_skipping_to_change_no_bit({"volume.procedural=phantom", "volume.dims=64", "image.width=32",
+                                          "image.height=32", "shading.model=none",
+                                          "compositing.form=back_to_front",
+                                          std::string("classification.method=") + method});
 }
 
 TEST(LaneRenderer, NotesDepthAndTheFirstVisibleSlabsNormal) {
