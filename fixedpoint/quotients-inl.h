@@ -28,13 +28,13 @@ HWY_INLINE auto divide(const N& numerator, const N& denominator, const Rescale& 
 
 /// Words that invert a denominator once for several quotients.
 template <class N>
-concept InvertsOnce = requires {
+inline constexpr bool kInvertsOnce = requires {
     typename N::InvertsOnce;
 };
 /// Three quotients by one denominator.
 template <class N>
 HWY_INLINE auto divide_three(const std::array<N, 3>& numerator, const N& denominator, const Rescale& to) {
-    if constexpr (InvertsOnce<N>) {
+    if constexpr (kInvertsOnce<N>) {
         Rescale whole = to;
         whole.shift = std::min(to.shift, 0);
         return quotients(numerator, to.shift > 0 ? shift_left(denominator, to.shift) : denominator, whole);

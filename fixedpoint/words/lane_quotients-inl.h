@@ -7,6 +7,7 @@
 #define SQUINT_FIXEDPOINT_WORDS_LANE_QUOTIENTS_INL_H
 #endif
 
+#include "fixedpoint/quotients-inl.h"
 #include "fixedpoint/words/lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -117,10 +118,79 @@ HWY_INLINE auto nearest_whole(V x) {
     const auto whole = hn::Set(hn::DFromV<V>(), FloatOf<T>(sizeof(T) == 4 ? 0x1.8p23 : 0x1.8p52));
     return hn::Sub(hn::BitCast(d, hn::Add(x, whole)), hn::BitCast(d, whole));
 }
+// A multiply-add rounds once.
+#if (HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2 && HWY_TARGET != HWY_SCALAR) || HWY_ARCH_ARM_A64
+inline constexpr bool kRoundsOnce = true;
+#else
+inline constexpr bool kRoundsOnce = false;
+#endif
+/// scaled / denominator as whole doubles, from the denominator's inverse.  An estimate, off by an eighth at most where
+/// results have 48 bits, is corrected by its exact remainder.  Without multiply-adds that round once, one half of the
+/// estimate times the denominator has at most 53 bits (range.cpp notes it).
+template <class V>
+HWY_INLINE V whole_quotient(V scaled, V below, V inverse, const Rescale& to) {
+    const hn::ScalableTag<double> d;
+    const auto one = hn::Set(d, 1.0), zero = hn::Zero(d);
+    const bool halves_up = to.rounding == Rounding::rnd, halves_to_even = to.rounding == Rounding::rnd_conv;
+    const auto estimate = hn::Mul(scaled, inverse);
+    // Halves up: lowered by a quarter, it is never rounded too high.
+    auto q = halves_up        ? hn::Floor(hn::Add(estimate, hn::Set(d, 0.25)))
+             : halves_to_even ? hn::Round(estimate)
+                              : hn::Trunc(estimate);
+    auto rest = zero;
+    if constexpr (kRoundsOnce) {
+        rest = hn::NegMulAdd(q, below, scaled);
+    } else {
+        const auto coarse = hn::Mul(hn::Trunc(hn::Mul(q, hn::Set(d, power_of_two<double>(-to.width / 2)))),
+                                    hn::Set(d, power_of_two<double>(to.width / 2)));
+        rest = hn::Sub(hn::Sub(scaled, hn::Mul(coarse, below)), hn::Mul(hn::Sub(q, coarse), below));
+    }
+    if (halves_up) return hn::Add(q, hn::IfThenElseZero(hn::Ge(rest, hn::Mul(below, hn::Set(d, 0.5))), one));
+    if (!halves_to_even) {
+        q = hn::Sub(q, hn::IfThenElseZero(hn::Lt(rest, zero), one));
+        return hn::Add(q, hn::IfThenElseZero(hn::Ge(rest, below), one));
+    }
+    const auto twice = hn::Add(rest, rest), halved = hn::Mul(q, hn::Set(d, 0.5));
+    const auto odd = hn::Ne(halved, hn::Trunc(halved));
+    const auto down = hn::Or(hn::Lt(twice, hn::Neg(below)), hn::And(hn::Eq(twice, hn::Neg(below)), odd));
+    const auto up = hn::Or(hn::Gt(twice, below), hn::And(hn::Eq(twice, below), odd));
+    q = hn::Sub(q, hn::IfThenElseZero(down, one));
+    return hn::Add(q, hn::IfThenElseZero(up, one));
+}
+/// Quotients in 64-bit lanes of numbers below 2^52, which doubles hold.
+template <KnownRescales K, std::size_t N>
+HWY_INLINE std::array<Lanes<std::int64_t, K>, N> quotients_of_doubles(
+    const std::array<Lanes<std::int64_t, K>, N>& numerators, Lanes<std::int64_t, K> denominator,
+    const Rescale& to) {
+    const hn::ScalableTag<double> df;
+    const hn::ScalableTag<std::int64_t> d;
+    const auto unit = hn::Set(df, 0x1p52), whole = hn::Set(df, 0x1.8p52);
+    const auto real = [&](auto x) HWY_ATTR {
+        return hn::Sub(hn::BitCast(df, hn::Or(x.v, hn::BitCast(d, unit))), unit);
+    };
+    const auto factor = hn::Set(df, power_of_two<double>(-to.shift)),
+               low = hn::Set(df, static_cast<double>(to.lowest)),
+               high = hn::Set(df, static_cast<double>(to.highest));
+    const auto below = real(denominator), inverse = hn::Div(hn::Set(df, 1.0), below);
+    std::array<Lanes<std::int64_t, K>, N> results;
+    for (std::size_t i = 0; i < N; ++i) {
+        const auto q = whole_quotient(hn::Mul(real(numerators[i]), factor), below, inverse, to);
+        const auto sum = hn::Add(hn::Min(hn::Max(q, low), high), whole);
+        results[i] = {hn::Sub(hn::BitCast(d, sum), hn::BitCast(d, whole))};
+    }
+    return results;
+}
 template <class T, KnownRescales K, std::size_t N>
 HWY_INLINE std::array<Lanes<T, K>, N> quotients(const std::array<Lanes<T, K>, N>& numerators,
                                                 Lanes<T, K> denominator, const Rescale& to) {
     using F = lanes_detail::FloatOf<T>;
+    if constexpr (kRoundsOnce && sizeof(T) == 8) {
+        const hn::ScalableTag<T> d;
+        auto all = denominator.v;
+        for (const auto& x : numerators) all = hn::Or(all, x.v);
+        if (hn::AllTrue(d, hn::Eq(hn::ShiftRight<52>(all), hn::Zero(d))))
+            return quotients_of_doubles(numerators, denominator, to);
+    }
     const hn::ScalableTag<F> df;
     const bool to_nearest = to.rounding == Rounding::rnd || to.rounding == Rounding::rnd_conv;
     const auto factor = hn::Set(df, static_cast<F>(power_of_two<double>(-to.shift)));
@@ -150,6 +220,9 @@ HWY_INLINE std::array<Lanes<T, K>, 3> quotients(const std::array<Lanes<T, K>, 3>
                                                 Lanes<T, K> denominator, const Rescale& to) {
     return lanes_detail::quotients(numerators, denominator, to);
 }
+
+template <KnownRescales K>
+inline constexpr bool kInvertsOnce<Lanes<std::int64_t, K>> = true;
 
 // ------------------------------------------------------------------------------------ wide numbers
 
@@ -258,41 +331,13 @@ HWY_INLINE bool any_positive(Lanes<std::int64_t, K> x) {
     return any(constant<Lanes<std::int64_t, K>>(0) < x);
 }
 namespace lanes_detail {
-/// An estimate, off by at most one, corrected by its exact remainder: one half of the estimate times the
-/// denominator has at most 53 bits (range.cpp notes it).  Results beyond 32 bits saturate.
+/// Results beyond 32 bits saturate.
 template <KnownRescales K>
 HWY_INLINE Lanes<std::int32_t, K> quotient_by(const WideLanes<K>& numerator, const WideLanes<K>& denominator,
                                               const WideLanes<K>& inverse, const Rescale& to) {
-    const hn::ScalableTag<double> d;
-    const auto one = hn::Set(d, 1.0), zero = hn::Zero(d);
-    const auto factor = hn::Set(d, power_of_two<double>(-to.shift));
-    const bool to_nearest = to.rounding == Rounding::rnd || to.rounding == Rounding::rnd_conv;
+    const auto factor = hn::Set(hn::ScalableTag<double>(), power_of_two<double>(-to.shift));
     const auto half = [&](auto part) SQUINT_WRITTEN_OUT {
-        const auto below = part(denominator), scaled = hn::Mul(part(numerator), factor);
-        const auto estimate = hn::Mul(scaled, part(inverse));
-        auto q = to_nearest ? hn::Round(estimate) : hn::Trunc(estimate);
-#if (HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2 && HWY_TARGET != HWY_SCALAR) || HWY_ARCH_ARM_A64
-        const auto rest = hn::NegMulAdd(q, below, scaled);  // rounds once
-#else
-        const auto coarse = hn::Mul(hn::Trunc(hn::Mul(q, hn::Set(d, power_of_two<double>(-to.width / 2)))),
-                                    hn::Set(d, power_of_two<double>(to.width / 2)));
-        const auto rest =
-            hn::Sub(hn::Sub(scaled, hn::Mul(coarse, below)), hn::Mul(hn::Sub(q, coarse), below));
-#endif
-        if (!to_nearest) {
-            q = hn::Sub(q, hn::IfThenElseZero(hn::Lt(rest, zero), one));
-            return hn::Add(q, hn::IfThenElseZero(hn::Ge(rest, below), one));
-        }
-        const auto twice = hn::Add(rest, rest);
-        auto down = hn::Lt(twice, hn::Neg(below)), up = hn::Ge(twice, below);
-        if (to.rounding == Rounding::rnd_conv) {
-            const auto halved = hn::Mul(q, hn::Set(d, 0.5));
-            const auto odd = hn::Ne(halved, hn::Trunc(halved));
-            down = hn::Or(down, hn::And(hn::Eq(twice, hn::Neg(below)), odd));
-            up = hn::Or(hn::Gt(twice, below), hn::And(hn::Eq(twice, below), odd));
-        }
-        q = hn::Sub(q, hn::IfThenElseZero(down, one));
-        return hn::Add(q, hn::IfThenElseZero(up, one));
+        return whole_quotient(hn::Mul(part(numerator), factor), part(denominator), part(inverse), to);
     };
     const auto q = narrow(by_halves<K>(half));
     return clamp(q, limit_in_lanes<std::int32_t, K>(to.lowest), limit_in_lanes<std::int32_t, K>(to.highest));

@@ -79,51 +79,77 @@ HWY_INLINE SlabParts<W> slab_parts(const MomentSeries& m, const MomentEnd<W>& a,
     return parts;
 }
 
-/// The moments int c y^k dy of a channel, k < order.
+/// A number of each channel.
 template <class W>
-HWY_INLINE Powers<W> mean_moments(const MomentSeries& m, const SlabParts<W>& p, int channel) {
+using Channels = std::array<W, 3>;
+template <class W>
+HWY_INLINE Channels<W> shares_of(const MomentSeries& m, const Channels<W>& parts, W span) {
+    Channels<W> shares = divide_three(parts, span, m.to_share);
+    for (W& share : shares) share = min(share, constant<W>(std::int64_t{1} << m.word_fraction));
+    return shares;
+}
+
+/// The moments int c y^k dy of each channel, k < order.
+template <class W>
+HWY_INLINE Channels<Powers<W>> mean_moments(const MomentSeries& m, const SlabParts<W>& p) {
     const auto count = static_cast<std::size_t>(m.order);
     const W zero = constant<W>(0), one = constant<W>(std::int64_t{1} << m.word_fraction);
     const auto same = p.a.row == p.b.row;
-    const auto light = [&](W row, int k) { return gather(m.moments, row, 1 + 3 * k + channel); };
     const W a_next_row = p.a.row + constant<W>(1);
-    const W a_start = light(p.a.row, 0), a_next = light(a_next_row, 0), b_start = light(p.b.row, 0);
-    const W a_here = a_start + quantise(p.a.fraction * (a_next - a_start), m.to_part);
-    const W b_here =
-        b_start + quantise(p.b.fraction * (light(p.b.row + constant<W>(1), 0) - b_start), m.to_part);
-    const W first = share_of(m, clamp(select(same, b_here, a_next) - a_here, zero, one), p.span);
-    const W last = share_of(m, clamp(select(same, zero, b_here - b_start), zero, one), p.span);
+    Channels<Powers<W>> moments;
+    Channels<W> first, last;
+    for (std::size_t c = 0; c < 3; ++c) {
+        Powers<W>& moment = moments[c];
+        const auto light = [&](W row, std::size_t k) {
+            return gather(m.moments, row, static_cast<int>(1 + 3 * k + c));
+        };
+        const W a_start = light(p.a.row, 0), a_next = light(a_next_row, 0), b_start = light(p.b.row, 0);
+        const W a_here = a_start + quantise(p.a.fraction * (a_next - a_start), m.to_part);
+        const W b_here =
+            b_start + quantise(p.b.fraction * (light(p.b.row + constant<W>(1), 0) - b_start), m.to_part);
+        first[c] = clamp(select(same, b_here, a_next) - a_here, zero, one);
+        last[c] = clamp(select(same, zero, b_here - b_start), zero, one);
 
-    // The whole sub-entries, from their own start and over their own depth.
-    Powers<W> moment;
-    moment[0] = clamp(select(same, zero, b_start - a_next), zero, one);
-    for (std::size_t k = 1; k < count; ++k)
-        moment[k] =
-            clamp(light(p.b.row, static_cast<int>(k)) - light(a_next_row, static_cast<int>(k)), zero, one);
-    for (std::size_t pass = 1; pass < count; ++pass)
-        for (std::size_t k = count - 1; k >= pass; --k)
-            moment[k] = clamp(moment[k] - quantise(p.a.next * moment[k - 1], m.to_product), zero, one);
+        // The whole sub-entries, from their own start and over their own depth.
+        moment[0] = clamp(select(same, zero, b_start - a_next), zero, one);
+        for (std::size_t k = 1; k < count; ++k)
+            moment[k] = clamp(light(p.b.row, k) - light(a_next_row, k), zero, one);
+        for (std::size_t pass = 1; pass < count; ++pass)
+            for (std::size_t k = count - 1; k >= pass; --k)
+                moment[k] = clamp(moment[k] - quantise(p.a.next * moment[k - 1], m.to_product), zero, one);
+    }
+    first = shares_of(m, first, p.span), last = shares_of(m, last, p.span);
     const W whole = divisor<W>(p.whole);
     // For a thin part the words resolve only the lower moments.
     for (std::size_t k = 0; k < count; ++k) {
-        for (std::size_t times = 0; times <= k; ++times) moment[k] = share_of(m, moment[k], whole);
+        Channels<W> shares{moments[0][k], moments[1][k], moments[2][k]};
+        for (std::size_t times = 0; times <= k; ++times) shares = shares_of(m, shares, whole);
         const auto thin = p.whole < constant<W>(resolved_depth(m.word_fraction, k));
-        if (k == 0 || !any(thin)) continue;
-        W sum = moment[0] * constant<W>(kSmooth[k][0]);
-        for (std::size_t i = 1; i < k; ++i) sum = sum + moment[i] * constant<W>(kSmooth[k][i]);
-        moment[k] = select(thin, clamp(quantise(max(sum, zero), m.to_mean), zero, one), moment[k]);
+        const bool smooths = k > 0 && any(thin);
+        for (std::size_t c = 0; c < 3; ++c) {
+            Powers<W>& moment = moments[c];
+            moment[k] = shares[c];
+            if (!smooths) continue;
+            W sum = moment[0] * constant<W>(kSmooth[k][0]);
+            for (std::size_t i = 1; i < k; ++i) sum = sum + moment[i] * constant<W>(kSmooth[k][i]);
+            moment[k] = select(thin, clamp(quantise(max(sum, zero), m.to_mean), zero, one), moment[k]);
+        }
     }
 
     // Joins the three parts, one after the other.
-    for (std::size_t k = 0; k < count; ++k) moment[k] = quantise(moment[k] * p.whole_power[k], m.to_product);
-    for (std::size_t pass = 1; pass < count; ++pass)
-        for (std::size_t k = count - 1; k >= pass; --k)
-            moment[k] = min(moment[k] + quantise(p.first_share * moment[k - 1], m.to_product), one);
-    for (std::size_t k = 0; k < count; ++k)
-        moment[k] = min(moment[k] + quantise(first * p.first_mean[k], m.to_product) +
-                            quantise(last * p.last_mean[k], m.to_product),
-                        one);
-    return moment;
+    for (std::size_t c = 0; c < 3; ++c) {
+        Powers<W>& moment = moments[c];
+        for (std::size_t k = 0; k < count; ++k)
+            moment[k] = quantise(moment[k] * p.whole_power[k], m.to_product);
+        for (std::size_t pass = 1; pass < count; ++pass)
+            for (std::size_t k = count - 1; k >= pass; --k)
+                moment[k] = min(moment[k] + quantise(p.first_share * moment[k - 1], m.to_product), one);
+        for (std::size_t k = 0; k < count; ++k)
+            moment[k] = min(moment[k] + quantise(first[c] * p.first_mean[k], m.to_product) +
+                                quantise(last[c] * p.last_mean[k], m.to_product),
+                            one);
+    }
+    return moments;
 }
 
 /// The Legendre moments L_j from the moments int c y^k dy.
@@ -170,19 +196,19 @@ HWY_NOINLINE std::array<W, 3> series_color(const MomentSeries& m, W near, W far,
 
     const auto descending = far < near;
     const auto deep = constant<W>(m.limit) < depth;
-    std::array<W, 3> color;
-    for (int c = 0; c < 3; ++c) {
+    const Channels<Powers<W>> moments = mean_moments(m, parts);
+    Channels<W> color;
+    for (std::size_t c = 0; c < 3; ++c) {
         const auto count = static_cast<std::size_t>(m.order);
-        const Powers<W> moment = legendre_moments(m, mean_moments(m, parts, c));
+        const Powers<W> moment = legendre_moments(m, moments[c]);
         W sum = shift_left(moment[0], m.weight_fraction);
         for (std::size_t j = 1; j < count; ++j) {
             const W seen = j % 2 ? select(descending, zero - moment[j], moment[j]) : moment[j];
             sum = sum + seen * weight[j];
         }
         if (!m.splits) sum = select(deep, shift_left(moment[0], m.weight_fraction), sum);
-        const auto at = static_cast<std::size_t>(c);
-        color[at] = clamp(quantise(max(sum, zero), m.to_ratio), constant<W>(m.lowest[at]),
-                          constant<W>(m.highest[at]));
+        color[c] =
+            clamp(quantise(max(sum, zero), m.to_ratio), constant<W>(m.lowest[c]), constant<W>(m.highest[c]));
     }
     return color;
 }

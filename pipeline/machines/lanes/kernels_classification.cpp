@@ -15,7 +15,8 @@ namespace squint::HWY_NAMESPACE {
 
 static_assert(BlendsPairs<Lanes<std::int32_t>> && LoadsRows<Lanes<float>>,
               "lerp_rows has lost its fast ways");
-static_assert(LoadsPairs<Lanes<std::int32_t>> && InvertsOnce<WideLanes<KnownRescales::nothing>>,
+static_assert(LoadsPairs<Lanes<std::int32_t>> && kInvertsOnce<WideLanes<KnownRescales::nothing>> &&
+                  kInvertsOnce<Lanes<std::int64_t>>,
               "opacities or ratios have lost their fast ways");
 
 /// The rows of pips.h, loaded as a whole.
