@@ -348,6 +348,29 @@ HWY_INLINE WideLanes<K> inverse_of(const WideLanes<K>& x) {
     return {hn::Div(one, x.low), hn::Div(one, x.high)};
 }
 }  // namespace lanes_detail
+/// quantised_wide_product of entries-inl.h.  Saturating wires only.
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int32_t, K> quantised_wide_product(Lanes<std::int32_t, K> a, Lanes<std::int32_t, K> b,
+                                                         const Rescale& to) {
+    const hn::ScalableTag<double> d;
+    const WideLanes<K> product = shift_left(wide_product(a, b), -to.shift);
+    const auto half = [&](auto part) SQUINT_WRITTEN_OUT {
+        const auto x = part(product);
+        switch (to.rounding) {
+            case Rounding::rnd:
+                return hn::Floor(hn::Add(x, hn::Set(d, 0.5)));
+            case Rounding::rnd_conv:
+                return hn::Round(x);
+            case Rounding::trn_zero:
+                return hn::Trunc(x);
+            default:
+                return hn::Floor(x);
+        }
+    };
+    const auto q = lanes_detail::narrow(lanes_detail::by_halves<K>(half));
+    return clamp(q, limit_in_lanes<std::int32_t, K>(to.lowest), limit_in_lanes<std::int32_t, K>(to.highest));
+}
+
 template <KnownRescales K>
 HWY_INLINE Lanes<std::int32_t, K> quotient(const WideLanes<K>& numerator, const WideLanes<K>& denominator,
                                            const Rescale& to) {

@@ -7,6 +7,7 @@
 #endif
 
 #include "fixedpoint/cell_table.h"
+#include "fixedpoint/split_lerp.h"
 #include "fixedpoint/words/lanes-inl.h"
 
 #include <cassert>
@@ -79,6 +80,42 @@ HWY_INLINE std::array<Lanes<std::int32_t, K>, 2> load_pair_of_rows(const Table& 
     const std::int32_t* words = table.narrow();
     const auto pairs = load_pairs([&](int lane) { return words + at[lane]; });
     return {Lanes<std::int32_t, K>{pairs[0]}, Lanes<std::int32_t, K>{pairs[1]}};
+}
+
+/// What a split lerp adds to `high`, the whole part of v0: quantised to the limits of `to`.
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int32_t, K> limited_sum(Lanes<std::int32_t, K> high, Lanes<std::int32_t, K> rest,
+                                              const Rescale& to) {
+    if constexpr (K == KnownRescales::halves_up) return high + rest;
+    Rescale limits = to;
+    limits.shift = 0;
+    return quantise(high + rest, limits);
+}
+/// lerp_nodes of pi2d-inl.h.
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int32_t, K> lerp_nodes(Lanes<std::int32_t, K> v0, Lanes<std::int32_t, K> v1,
+                                             Lanes<std::int32_t, K> weight, int weight_bits,
+                                             const Rescale& to) {
+    if (!splits_lerp(to, weight_bits)) return quantise(blend(v0, v1, weight, weight_bits), to);
+    const int coarser = to.shift - weight_bits, low = to.shift / 2;
+    const auto rise = v1 - v0;
+    const auto added = shift_left(fraction_bits(v0, coarser), weight_bits) +
+                       weight * fraction_bits(rise, low) +
+                       make_word(WordTag<Lanes<std::int32_t, K>>{}, to.bias);
+    const auto rest = floor_shift(rise, low) * weight + floor_shift(added, low);
+    return limited_sum(floor_shift(v0, coarser), floor_shift(rest, to.shift - low), to);
+}
+/// lerp_row of entries-inl.h.
+template <KnownRescales K>
+HWY_INLINE Lanes<std::int32_t, K> lerp_row(const Table& table, Lanes<std::int32_t, K> row,
+                                           Lanes<std::int32_t, K> weight, int weight_bits,
+                                           const Rescale& to) {
+    const auto [near, far] = load_pair_of_rows(table, row);
+    if (!splits_lerp(to, weight_bits)) return quantise(blend(near, far, weight, weight_bits), to);
+    const int coarser = to.shift - weight_bits;
+    const auto rest = shift_left(fraction_bits(near, coarser), weight_bits) + weight * (far - near) +
+                      make_word(WordTag<Lanes<std::int32_t, K>>{}, to.bias);
+    return limited_sum(floor_shift(near, coarser), floor_shift(rest, to.shift), to);
 }
 
 /// The lower and the upper halves of 32-bit words, unsigned.
@@ -290,6 +327,9 @@ HWY_INLINE std::array<std::array<Lanes<T, K>, 4>, 2> gather_two_cells(const Cell
         if (table.is_narrow())
             return load_neighbours(table.narrow_words(),
                                    row * make_word(WordTag<Lanes<T, K>>{}, table.size()) + column);
+    if constexpr (sizeof(T) == 4)
+        return load_two_rows(reinterpret_cast<const std::int32_t*>(table.wide_words()),
+                             row * make_word(WordTag<Lanes<T, K>>{}, table.size()) + column);
     return {gather_cell(table, row, column),
             gather_cell(table, row, column + make_word(WordTag<Lanes<T, K>>{}, 1))};
 }

@@ -8,6 +8,7 @@
 
 #include "pipeline/classification/entries.h"
 
+#include "fixedpoint/split_lerp.h"
 #include "pipeline/stages/interpolation-inl.h"
 #include "pipeline/stages/location-inl.h"
 
@@ -44,14 +45,50 @@ HWY_INLINE std::array<W, 2> two_rows(const Table& table, W row) {
         return {gather(table, row, 0), gather(table, row + constant<W>(1), 0)};
 }
 
+/// The lerp between rows `row` and `row + 1` of a table of one column; its words are 0 or more.
+template <class W>
+HWY_INLINE W lerp_row(const Table& table, W row, W weight, int weight_bits, const Rescale& to) {
+    const std::array<W, 2> ends = two_rows(table, row);
+    return quantise(blend(ends[0], ends[1], weight, weight_bits), to);
+}
+/// Lanes that split the lerp need the width of its rise and of its result alone.
+inline Range lerp_row(const Table& table, Range row, Range weight, int weight_bits, const Rescale& to) {
+    const int lanes_before = Range::needs.lane_bits;
+    const std::array<Range, 2> ends = two_rows(table, row);
+    const Range result = quantise(blend(ends[0], ends[1], weight, weight_bits), to);
+    if (!splits_lerp(to, weight_bits)) return result;
+    Int128 rise = 0;
+    for (int i = 0; i + 1 < table.rows(); ++i) {
+        const Int128 change = table.word(i + 1, 0) - table.word(i, 0);
+        rise = std::max(rise, change < 0 ? -change : change);
+    }
+    Range::needs.lane_bits = std::max(lanes_before, signed_bits(ends[0]));
+    const Range rest = noted(Range{-rise, rise}) * weight;
+    noted({rest.low, rest.high + (Int128{1} << to.shift) + to.bias});
+    return noted(result);
+}
+
+/// a b of a few numbers, exact in a Wide, quantised once.
+template <class W>
+HWY_INLINE W quantised_wide_product(W a, W b, const Rescale& to) {
+    return quantise(a * b, to);
+}
+inline Range quantised_wide_product(Range a, Range b, const Rescale& to) {
+    const int lanes_before = Range::needs.lane_bits;
+    const Range product = a * b, result = quantise(product, to);
+    // One bit more for half a last bit that is added.
+    Range::needs.wide_bits = std::max(Range::needs.wide_bits, signed_bits(product) + 1);
+    Range::needs.lane_bits = to.wraps ? 65 : std::max(lanes_before, signed_bits(result));
+    return result;
+}
+
 template <class W>
 HWY_INLINE W opacity_of_depth(const OpacityUnit& unit, W depth) {
     const int fraction = unit.depth_fraction - unit.row_bits;
     const W row = min(floor_shift(depth, fraction), constant<W>(unit.rows.rows() - 2));
     const std::int64_t one = std::int64_t{1} << fraction;
     const W rest = within(min(depth - shift_left(row, fraction), constant<W>(one)), 0, one);
-    const std::array<W, 2> ends = two_rows(unit.rows, row);
-    return quantise(blend(ends[0], ends[1], rest, fraction), unit.to_alpha);
+    return lerp_row(unit.rows, row, rest, fraction, unit.to_alpha);
 }
 /// 1 - exp(-x) for x >= 0 in float32.  With -x = n ln 2 + r, |r| <= ln 2 / 2, exp(r) - 1 is its series to
 /// r^7, which is off by at most 2^-26 of r.

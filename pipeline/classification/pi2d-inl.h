@@ -30,6 +30,25 @@ HWY_INLINE EntryPosition<W> node_position(const PreIntegrated2D& m, W input) {
     return {cell, within(min(node - shift_left(cell, bits), constant<W>(one)), 0, one)};
 }
 
+/// A lerp between numbers of 0 or more.
+template <class W>
+HWY_INLINE W lerp_nodes(W v0, W v1, W weight, int weight_bits, const Rescale& to) {
+    return quantise(blend(v0, v1, weight, weight_bits), to);
+}
+inline Range lerp_nodes(Range v0, Range v1, Range weight, int weight_bits, const Rescale& to) {
+    const int lanes_before = Range::needs.lane_bits;
+    const Range result = quantise(blend(v0, v1, weight, weight_bits), to);
+    if (!splits_lerp(to, weight_bits)) return result;
+    // The rise's upper bits times the weight, and what is added to it before the sum is rounded.
+    Range::needs.lane_bits = lanes_before;
+    const int low = to.shift / 2;
+    const Range rest = floor_shift(noted(v1 - v0), low) * weight;
+    const Int128 added = (Int128{1} << to.shift) + to.bias + (weight.high << low);
+    noted({0, added});
+    noted({rest.low, rest.high + (added >> low)});
+    return noted(result);
+}
+
 /// Interpolates a table between its nodes: three lerps, each rounded once.
 template <class W>
 HWY_INLINE std::array<W, 4> between_cells(const PreIntegrated2D& m, const CellTable& cells,
@@ -40,9 +59,9 @@ HWY_INLINE std::array<W, 4> between_cells(const PreIntegrated2D& m, const CellTa
     std::array<W, 4> cell;
     for (std::size_t c = 0; c < 4; ++c) {
         const Rescale& to = c < 3 ? m.to_color : m.to_alpha;
-        const W here = quantise(blend(left[c], right[c], b.fraction, m.node_fraction), to);
-        const W next = quantise(blend(below[c], across[c], b.fraction, m.node_fraction), to);
-        cell[c] = quantise(blend(here, next, f.fraction, m.node_fraction), to);
+        const W here = lerp_nodes(left[c], right[c], b.fraction, m.node_fraction, to);
+        const W next = lerp_nodes(below[c], across[c], b.fraction, m.node_fraction, to);
+        cell[c] = lerp_nodes(here, next, f.fraction, m.node_fraction, to);
     }
     return cell;
 }

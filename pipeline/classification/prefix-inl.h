@@ -240,8 +240,9 @@ HWY_INLINE W largest_color(const PremultipliedRules& r, W alpha) {
 /// A premultiplied part with another opacity: C alpha' / alpha.
 template <class W>
 HWY_INLINE Slab<W> with_alpha(const PremultipliedRules& r, Slab<W> part, W alpha) {
-    const W some = divisor<W>(part.alpha), limit = largest_color(r, alpha);
-    for (W& color : part.color) color = min(divide(color * alpha, some, r.to_scaled), limit);
+    const Wide<W> some = widen(divisor<W>(part.alpha));
+    const W limit = largest_color(r, alpha);
+    for (W& color : part.color) color = min(divide(wide_product(color, alpha), some, r.to_scaled), limit);
     part.alpha = alpha;
     return part;
 }
@@ -265,7 +266,7 @@ HWY_INLINE Slab<W> finish_premultiplied(const PrefixLookup& p, const Premultipli
             const W one = constant<W>(p.entries.one_alpha), clear = one - part.alpha;
             for (int c = 0; c < 3; ++c) {
                 W& color = part.color[static_cast<std::size_t>(c)];
-                const W behind = quantise(wall_color(p.entries, cut, c) * clear, r.to_product);
+                const W behind = quantised_wide_product(wall_color(p.entries, cut, c), clear, r.to_product);
                 color = select(wall, min(color + behind, constant<W>(r.one_color)), color);
             }
             part.alpha = select(wall, one, part.alpha);
@@ -275,7 +276,8 @@ HWY_INLINE Slab<W> finish_premultiplied(const PrefixLookup& p, const Premultipli
     if (any(point)) {
         const Slab<W> here = classify_point(p.entries, front, length);
         for (std::size_t c = 0; c < 3; ++c)
-            part.color[c] = select(point, quantise(here.color[c] * here.alpha, r.to_product), part.color[c]);
+            part.color[c] =
+                select(point, quantised_wide_product(here.color[c], here.alpha, r.to_product), part.color[c]);
         part.alpha = select(point, here.alpha, part.alpha);
     }
     return part;

@@ -62,9 +62,17 @@ void leave_out_proven_limits(Plan& plan, const Slab<Range>& slab) {
                            std::all_of(slab.color.begin(), slab.color.end(),
                                        [&](const Range& c) { return within_unit(c, s.color_fraction); });
     s.of_units = unit_slab;
-    if (s.takes_from_transparency() && !s.premultiplied && unit_slab &&
-        s.contribution_fraction == s.transparency_fraction && color.integer_bits >= 1 &&
-        color.fraction_bits >= s.contribution_fraction)
+    // Where c is premultiplied it is at most alpha, unless it is lit, and c T rounds to at most w where both
+    // keep the same bits.
+    const bool shares_within_w = s.premultiplied
+                                     ? !plan.lit && s.form == CompositingForm::w &&
+                                           plan.specs[Wire::slab_alpha].format.integer_bits >= 1 &&
+                                           s.color_fraction >= s.alpha_fraction &&
+                                           color.fraction_bits == s.contribution_fraction &&
+                                           s.to_color.rounding == s.to_contribution.rounding
+                                     : color.fraction_bits >= s.contribution_fraction;
+    if (s.takes_from_transparency() && unit_slab && s.contribution_fraction == s.transparency_fraction &&
+        color.integer_bits >= 1 && shares_within_w)
         s.to_color.limits = s.to_color_sum.limits = s.to_transparency.limits = false;
 }
 

@@ -29,16 +29,19 @@ using DefaultShading = Facts<ShadingStage, Is<&ShadingStage::model, ShadingModel
                              DropsBits<&ShadingStage::to_specular_sum>, DropsBits<&ShadingStage::to_diffuse>,
                              DropsBits<&ShadingStage::to_specular>, DropsBits<&ShadingStage::to_lit>>;
 
-/// Form w, straight colours, sums that no limit meets.  A transparent slab is the identity.
-using DefaultCompositing =
+/// Form w, sums that no limit meets.  A transparent slab is the identity.
+template <bool kPremultiplied>
+using SumsOfW =
     Facts<CompositingStage, Is<&CompositingStage::form, CompositingForm::w>,
-          Is<&CompositingStage::premultiplied, false>,
+          Is<&CompositingStage::premultiplied, kPremultiplied>,
           Same<&CompositingStage::contribution_fraction, &CompositingStage::transparency_fraction>,
           DropsBits<&CompositingStage::to_contribution>, DropsBits<&CompositingStage::to_color>,
           DoesNothing<&CompositingStage::to_color_sum>, DoesNothing<&CompositingStage::to_transparency>>;
+using DefaultCompositing = SumsOfW<false>;
 
 /// ... and products of numbers from 0 to 1 of 15 bits, rounded halves to even.
-using UnitCompositing = DefaultCompositing::And<
+template <bool kPremultiplied>
+using UnitSums = typename SumsOfW<kPremultiplied>::template And<
     Is<&CompositingStage::of_units, true>, Is<&CompositingStage::alpha_fraction, 15>,
     Is<&CompositingStage::color_fraction, 15>, Is<&CompositingStage::transparency_fraction, 15>,
     Is<&CompositingStage::contribution_fraction,
@@ -46,5 +49,17 @@ using UnitCompositing = DefaultCompositing::And<
     DropsBits<&CompositingStage::to_contribution, 15>, DropsBits<&CompositingStage::to_color, 15>,
     Rounds<&CompositingStage::to_contribution, Rounding::rnd_conv>,
     Rounds<&CompositingStage::to_color, Rounding::rnd_conv>>;
+using UnitCompositing = UnitSums<false>;
+using PremultipliedUnitCompositing = UnitSums<true>;
+
+/// ... of wider numbers from 0 to 1, whose products are exact in 53 bits.
+template <bool kPremultiplied>
+using WideUnitSums = typename SumsOfW<kPremultiplied>::template And<
+    Is<&CompositingStage::of_units, true>, AtMost<&CompositingStage::alpha_fraction, 26>,
+    AtMost<&CompositingStage::color_fraction, 26>, AtMost<&CompositingStage::transparency_fraction, 26>,
+    Rounds<&CompositingStage::to_contribution, Rounding::rnd_conv>,
+    Rounds<&CompositingStage::to_color, Rounding::rnd_conv>>;
+using WideUnitCompositing = WideUnitSums<false>;
+using PremultipliedWideUnitCompositing = WideUnitSums<true>;
 
 }  // namespace squint

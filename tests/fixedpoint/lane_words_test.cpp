@@ -9,6 +9,7 @@
 #include "fixedpoint/words.h"
 #include "fixedpoint/words/all_lanes-inl.h"
 #include "fixedpoint/words/unit_lanes-inl.h"
+#include "fixedpoint/words/unit_reals-inl.h"
 #include "pipeline/classification/entries-inl.h"
 
 #include <bit>
@@ -219,6 +220,79 @@ void compare_unit_products(std::vector<std::string>& wrong) {
             [&](auto x, auto y, auto) { return quantised_product(x, y, to); });
 }
 
+/// Numbers from 0 to 1 of more bits, as doubles: the same.
+void compare_unit_reals(std::vector<std::string>& wrong) {
+    using L = Lanes<std::int32_t>;
+    Comparison<std::int32_t> draw(wrong);
+    for (int round = 0; round < 100'000 && wrong.empty(); ++round) {
+        const int more = static_cast<int>(draw.between(0, UnitReals::kMostBits - 15));
+        const std::int64_t one = std::int64_t{1} << (15 + more);
+        Rescale to(2 * (15 + more), Spec{{1, 15 + more, false}, Rounding::rnd_conv, Overflow::sat});
+        to.limits = false;
+        std::int32_t a[16], b[16], product[16], clear[16];
+        for (std::int32_t* x : {a, b})
+            for (int i = 0; i < 16; ++i)
+                x[i] = static_cast<std::int32_t>(draw.between(0, 1) ? any_unit(draw) << more
+                                                                    : draw.between(0, one));
+        const UnitReals p = unit_reals(load<L>(a)), q = unit_reals(load<L>(b));
+        store(words_of<L>(quantised_product(p, q, to))[0], product);
+        store(words_of<L>(only(p < q, constant<UnitReals>(one) - p))[0], clear);
+        for (std::size_t i = 0; i < UnitReals::count(); ++i)
+            if (product[i] != quantised_product(std::int64_t{a[i]}, std::int64_t{b[i]}, to) ||
+                clear[i] != (a[i] < b[i] ? one - a[i] : 0))
+                wrong.push_back("unit reals of " + std::to_string(a[i]) + " and " + std::to_string(b[i]));
+    }
+}
+
+/// Lerps whose blend is wider than a lane, and products that are.
+void compare_wide_steps(std::vector<std::string>& wrong) {
+    Comparison<std::int32_t, KnownRescales::halves_up> compare(wrong);
+    Comparison<std::int32_t> any_rounding(wrong);
+    constexpr int kRows = 200;
+    for (int round = 0; round < 4000 && wrong.empty(); ++round) {
+        const int fraction = static_cast<int>(compare.between(15, 22)),
+                  bits = static_cast<int>(compare.between(8, 14)),
+                  coarser = static_cast<int>(compare.between(0, 2));
+        const std::int64_t one = std::int64_t{1} << (fraction + coarser), whole = std::int64_t{1} << bits;
+        const Spec spec{{1, fraction, false}, Rounding::rnd, Overflow::sat};
+        Rescale to(fraction + coarser + bits, spec);
+        const auto draw_lerp = [&](int i) { return compare.between(0, i == 2 ? whole : one); };
+        const auto lerp = [&](auto x, auto y, auto w) {
+            if constexpr (std::is_same_v<decltype(x), std::int64_t>)
+                return quantise(blend(x, y, w, bits), to);
+            else
+                return lerp_nodes(x, y, w, bits, to);
+        };
+        any_rounding("split lerp", draw_lerp, lerp);
+        Table table(kRows, 1);
+        for (int i = 0; i < kRows; ++i) table.set_raw(i, 0, i == 0 ? 0 : one * i / (kRows - 1));
+        const auto between_rows = [&](auto row, auto, auto w) {
+            if constexpr (std::is_same_v<decltype(row), std::int64_t>)
+                return quantise(blend(gather(table, row, 0), gather(table, row + 1, 0), w, bits), to);
+            else
+                return lerp_row(table, row, w, bits, to);
+        };
+        const auto draw_row = [&](int i) { return compare.between(0, i == 2 ? whole : kRows - 2); };
+        any_rounding("lerp of rows", draw_row, between_rows);
+        to.limits = false;
+        compare("split lerp without limits", draw_lerp, lerp);
+        compare("lerp of rows without limits", draw_row, between_rows);
+        for (const Rounding rounding :
+             {Rounding::trn, Rounding::trn_zero, Rounding::rnd, Rounding::rnd_conv}) {
+            const Rescale rounded(fraction + static_cast<int>(compare.between(-4, fraction)),
+                                  Spec{{1, fraction, false}, rounding, Overflow::sat});
+            any_rounding(
+                "wide product", [&](int) { return compare.between(0, 3) ? compare.any(fraction) : 1 << 10; },
+                [&](auto x, auto y, auto) {
+                    if constexpr (std::is_same_v<decltype(x), std::int64_t>)
+                        return quantise(x * y, rounded);
+                    else
+                        return quantised_wide_product(x, y, rounded);
+                });
+        }
+    }
+}
+
 /// Products, sums, order and masks in 16 bits, on their way from words of 32 bits and back.
 #if HWY_ARCH_X86 && HWY_TARGET <= HWY_SSE4
 void compare_unit_lanes(std::vector<std::string>& wrong) {
@@ -367,7 +441,7 @@ void compare_float_words(std::vector<std::string>& wrong) {
 void compare_all_words(std::vector<std::string>& wrong) {
     compare_words<std::int32_t>(wrong);
     compare_words<std::int64_t>(wrong);
-    compare_unit_products(wrong);
+    compare_unit_products(wrong), compare_unit_reals(wrong), compare_wide_steps(wrong);
     compare_unit_lanes(wrong);
     compare_float_words(wrong);
 }

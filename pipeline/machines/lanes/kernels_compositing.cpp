@@ -8,6 +8,7 @@
 #include "fixedpoint/words/float_lanes-inl.h"
 #include "fixedpoint/words/lane_quotients-inl.h"
 #include "fixedpoint/words/lanes-inl.h"
+#include "pipeline/machines/lanes/composite_units-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/stages/compositing-inl.h"
 #include "pipeline/stages/default_facts.h"
@@ -66,6 +67,27 @@ void composite_rows(const Plan& plan, const lanes::RayPacket& packet, int steps,
         store_whole(count, pixels.samples.v + r);
         store_whole(select(active, one, zero), pixels.active.v + r);
     }
+}
+
+/// Stage 6 of numbers from 0 to 1, in U.
+template <class U, class F>
+void composite_unit_rows(const Plan& plan, const lanes::RayPacket& packet, int steps,
+                         const lanes::Samples& samples, lanes::PixelPacket& pixels, lanes::Batch&) {
+    using L = Lanes<std::int32_t>;
+    composite_units<U, L, F>(plan.compositing, packet, steps, samples.first, pixels,
+                             [&](int at, Slab<U>& slab) SQUINT_WRITTEN_OUT {
+                                 const PartsOf<U, L> alpha = load_parts<U, L>(samples.alpha.v + at);
+                                 if (!any_part_of<U, L>([&](std::size_t i) SQUINT_WRITTEN_OUT {
+                                         return constant<L>(0) < alpha[i];
+                                     }))
+                                     return false;
+                                 slab.alpha = units_from<U, L>(alpha);
+                                 for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
+                                     slab.color[c] =
+                                         units_from<U, L>(load_parts<U, L>(samples.color[c].v + at));
+                                 });
+                                 return true;
+                             });
 }
 
 /// Computes only the transparency, front to back, without waiting for colours.
@@ -146,8 +168,27 @@ void compositing_kernel_of(const Plan& plan, const lanes::StageWay& way, lanes::
     if (missing.empty()) missing = UnitCompositing::missing(stage);
     if (missing.empty())
         choose.template operator()<Lanes<std::int32_t, KnownRescales::unit_products>, UnitCompositing>();
+    // U has room for sums of slabs whose stage is known as Straight or Premultiplied.
+    const auto in_units = [&]<class U, class Straight, class Premultiplied>() {
+        if (keeps_t || !(Straight::hold(stage) || Premultiplied::hold(stage))) return false;
+        kernels.composite =
+            stage.premultiplied ? &composite_unit_rows<U, Premultiplied> : &composite_unit_rows<U, Straight>;
+        return true;
+    };
+    bool units = missing.empty(), wide_units = false;
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_SSE4
+    if (lanes::why_not_narrow(way, KnownRescales::nothing).empty())
+        units |= in_units.template operator()<UnitLanes, UnitCompositing, PremultipliedUnitCompositing>();
+#endif
+    if constexpr (Lanes<std::int32_t>::count() > 1)
+        if (!units && !way.is_float && way.bits == 64)
+            wide_units =
+                in_units
+                    .template operator()<UnitReals, WideUnitCompositing, PremultipliedWideUnitCompositing>();
+    if (units) missing.clear();  // nothing is faster
     const char* const name = keeps_t                           ? "composite.depth"
-                             : missing.empty()                 ? "composite.unit15"
+                             : units                           ? "composite.unit15"
+                             : wide_units                      ? "composite.unit26"
                              : DefaultCompositing::hold(stage) ? "composite.default"
                                                                : "composite";
     kernels.chose(lanes::Segment::composite, name, missing);

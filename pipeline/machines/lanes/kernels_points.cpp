@@ -6,11 +6,10 @@
 #include <hwy/foreach_target.h>
 
 #include "fixedpoint/words/all_lanes-inl.h"
-#include "fixedpoint/words/unit_lanes-inl.h"
 #include "pipeline/classification/methods-inl.h"
+#include "pipeline/machines/lanes/composite_units-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/machines/lanes/slabs-inl.h"
-#include "pipeline/stages/compositing-inl.h"
 #include "pipeline/stages/default_facts.h"
 
 #include <array>
@@ -35,44 +34,49 @@ void classify_paired_points(const Plan& plan, int steps, lanes::Samples& samples
     }
 }
 
-#if HWY_ARCH_X86 && HWY_TARGET <= HWY_SSE4
-using U = UnitLanes;
-using Parts = UnitParts<L>;
-
-HWY_INLINE Parts load_parts(const lanes::Word* from) {
-    Parts parts;
-    for_parts<L>([&](std::size_t i) SQUINT_WRITTEN_OUT { parts[i] = load<L>(from + i * L::count()); });
-    return parts;
-}
-HWY_INLINE void store_parts(const Parts& parts, lanes::Word* to) {
-    for_parts<L>([&](std::size_t i) SQUINT_WRITTEN_OUT { store(parts[i], to + i * L::count()); });
-}
-/// Whether f(i) holds in a lane of some part.
-template <class F>
-HWY_INLINE bool any_part(F&& f) {
-    auto mask = f(std::size_t{0});
-    if constexpr (kPartsOfUnits<L> == 2) mask = mask | f(std::size_t{1});
-    return any(mask);
-}
-
-/// Points between paired rows, in 32 bits, narrowed then.
-class NarrowedPoints {
+/// Points that are classified in 32 bits, narrowed or widened then.
+template <class U, class Points>
+class ConvertedPoints {
   public:
-    HWY_INLINE NarrowedPoints(const Plan& plan, const std::int16_t*) : points_(plan) {}
-    HWY_INLINE Slab<U> classify(const Parts& input, const lanes::Samples& samples, int at) const {
-        std::array<Parts, 3> color;
-        Parts alpha;
-        for_parts<L>([&](std::size_t i) SQUINT_WRITTEN_OUT {
+    HWY_INLINE ConvertedPoints(const Plan& plan, const std::int16_t*) : points_(plan) {}
+    HWY_INLINE Slab<U> classify(const PartsOf<U, L>& input, const lanes::Samples& samples, int at) const {
+        std::array<PartsOf<U, L>, 3> color;
+        PartsOf<U, L> alpha;
+        for_parts_of<U, L>([&](std::size_t i) SQUINT_WRITTEN_OUT {
             const Slab<L> slab = points_.classify(input[i], load<L>(samples.length.v + at + i * L::count()));
             for_three([&](std::size_t c) SQUINT_WRITTEN_OUT { color[c][i] = slab.color[c]; });
             alpha[i] = slab.alpha;
         });
-        return {{units_of<L>(color[0]), units_of<L>(color[1]), units_of<L>(color[2])}, units_of<L>(alpha)};
+        return {{units_from<U, L>(color[0]), units_from<U, L>(color[1]), units_from<U, L>(color[2])},
+                units_from<U, L>(alpha)};
     }
 
   private:
-    PairedPoints<L> points_;
+    Points points_;
 };
+
+/// Colours and opacities stay in registers, and are composited in U.
+template <class U, class F, class Points>
+void classify_and_composite_points(const Plan& plan, const std::int16_t* rows, const lanes::RayPacket& packet,
+                                   int steps, const lanes::Samples& samples, lanes::PixelPacket& pixels) {
+    const Points points(plan, rows);
+    const Unseen<L> unseen(plan);
+    composite_units<U, L, F>(
+        plan.compositing, packet, steps, samples.first, pixels,
+        [&](int at, Slab<U>& slab) SQUINT_WRITTEN_OUT {
+            const PartsOf<U, L> input = load_parts<U, L>(samples.input.v + at);
+            if (unseen.left_out && !any_part_of<U, L>([&](std::size_t i) SQUINT_WRITTEN_OUT {
+                    return unseen.seen(input[i], input[i]);
+                }))
+                return false;
+            slab = points.classify(input, samples, at);
+            return true;
+        });
+}
+
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_SSE4
+using U = UnitLanes;
+using Parts = UnitParts<L>;
 
 /// Points between rows of 16 bits.
 class UnitPoints {
@@ -111,7 +115,7 @@ class UnitPoints {
         const std::array<U, 4> between =
             lerp_unit_rows<L>(rows_, row, hn::ShiftLeftSame(narrow_words<L>(weight), 15 - weight_bits_));
         Slab<U> slab{{between[0], between[1], between[2]}, between[EntryLookup::alpha]};
-        const bool some_short = !samples.all_full && any_part([&](std::size_t i) SQUINT_WRITTEN_OUT {
+        const bool some_short = !samples.all_full && any_part_of<U, L>([&](std::size_t i) SQUINT_WRITTEN_OUT {
             return load<L>(samples.length.v + at + i * L::count()) < full_;
         });
         if (some_short || any(below_opaque_ < slab.alpha)) finish(input, samples, at, slab);
@@ -141,58 +145,12 @@ class UnitPoints {
     U below_opaque_;
 };
 
-/// Colours and opacities stay in registers, and are composited in 16 bits.
-template <class Points>
-void classify_and_composite_points(const Plan& plan, const std::int16_t* rows, const lanes::RayPacket& packet,
-                                   int steps, const lanes::Samples& samples, lanes::PixelPacket& pixels) {
-    CompositingStage stage = plan.compositing;
-    UnitCompositing::assume(stage);
-    const Points points(plan, rows);
-    const Unseen<L> unseen(plan);
-    const U zero = constant<U>(0), one = constant<U>(1);
-    for (int r = 0; r < lanes::kRays; r += static_cast<int>(U::count())) {
-        const auto units = [&](const lanes::Row& row) { return units_of<L>(load_parts(row.v + r)); };
-        Accumulated<U> pixel{{units(pixels.color[0]), units(pixels.color[1]), units(pixels.color[2])},
-                             units(pixels.transparency)};
-        Parts left = load_parts(packet.slabs.v + r);  // slabs of each ray, of this batch's
-        for (L& slabs : left)
-            slabs = clamp(slabs - constant<L>(samples.first), constant<L>(0), constant<L>(lanes::kSteps));
-        const U slabs = units_of<L>(left);
-        U count = zero;
-        UnitMask active = zero < units(pixels.active);
-        for (int step = 0; step < steps; ++step) {
-            active = active & (constant<U>(step) < slabs);
-            if (!any(active)) break;
-            count = count + only(active, one);
-            const int at = step * lanes::kRays + r;
-            const Parts input = load_parts(samples.input.v + at);
-            if (unseen.left_out &&
-                !any_part([&](std::size_t i) SQUINT_WRITTEN_OUT { return unseen.seen(input[i], input[i]); }))
-                continue;
-            const Slab<U> slab = points.classify(input, samples, at);
-            // Transparent slabs change nothing: those of rays that have ended, too.
-            const U alpha = only(active, slab.alpha);
-            take_contribution(stage, pixel, slab.color,
-                              rounded_contribution(stage, alpha, pixel.transparency));
-            active = active & goes_on(stage, pixel);
-        }
-        for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
-            store_parts(words_of<L>(pixel.color[c]), pixels.color[c].v + r);
-        });
-        store_parts(words_of<L>(pixel.transparency), pixels.transparency.v + r);
-        Parts counted = words_of<L>(count);
-        for (std::size_t i = 0; i < counted.size(); ++i)
-            counted[i] = counted[i] + load<L>(pixels.samples.v + r + i * L::count());
-        store_parts(counted, pixels.samples.v + r);
-        store_parts(words_of<L>(only(active, one)), pixels.active.v + r);
-    }
-}
-
 void choose_fused(const EntryLookup& entries, lanes::StageKernels& kernels) {
     kernels.unit_rows = UnitPoints::rows_of(entries);
     const bool fit = !kernels.unit_rows.empty();
     kernels.classify_composite =
-        fit ? &classify_and_composite_points<UnitPoints> : &classify_and_composite_points<NarrowedPoints>;
+        fit ? &classify_and_composite_points<U, UnitCompositing, UnitPoints>
+            : &classify_and_composite_points<U, UnitCompositing, ConvertedPoints<U, PairedPoints<L>>>;
     kernels.chose(lanes::Segment::classify_composite, "classify+composite.unit15",
                   fit ? "" : "rows do not fit 16 bits");
 }
@@ -207,14 +165,21 @@ void point_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::Sta
     const std::string name = "classify." + std::string(name_of(plan.scene.classification.method));
     const std::string missing = PairedPoints<L>::missing(plan, ways.classification);
     kernels.chose(lanes::Segment::classify, missing.empty() ? name + ".paired" : name, missing);
-    if (!missing.empty()) return;
-    kernels.classify = &classify_paired_points;
+    if (missing.empty()) kernels.classify = &classify_paired_points;
     const OutputSettings& output = plan.scene.output;
-    const bool noted = plan.wants_depth || output.depth || output.normals;
-    if (noted || !UnitCompositing::hold(plan.compositing) ||
-        !lanes::why_not_narrow(ways.compositing, KnownRescales::nothing).empty())
-        return;
-    choose_fused(std::get<PostClassification>(plan.method).entries, kernels);
+    if (plan.wants_depth || output.depth || output.normals) return;
+    if (missing.empty() && UnitCompositing::hold(plan.compositing) &&
+        lanes::why_not_narrow(ways.compositing, KnownRescales::nothing).empty())
+        return choose_fused(std::get<PostClassification>(plan.method).entries, kernels);
+    if constexpr (L::count() > 1)
+        if (lanes::why_not_narrow(ways.classification, L::kKnown).empty() && ways.compositing.bits == 64 &&
+            WideUnitCompositing::hold(plan.compositing)) {
+            kernels.classify_composite =
+                &classify_and_composite_points<UnitReals, WideUnitCompositing,
+                                               ConvertedPoints<UnitReals, AnyPoints<L>>>;
+            kernels.chose(lanes::Segment::classify_composite, "classify+composite.unit26",
+                          missing.empty() ? UnitCompositing::missing(plan.compositing) : missing);
+        }
 }
 
 }  // namespace squint::HWY_NAMESPACE

@@ -84,6 +84,18 @@ class PairedPoints {
     L full_, least_opaque_;
 };
 
+/// Post-classification of any rows.
+template <class L>
+class AnyPoints {
+  public:
+    HWY_INLINE explicit AnyPoints(const Plan& plan)
+        : entries_(std::get<PostClassification>(plan.method).entries) {}
+    HWY_INLINE Slab<L> classify(L input, L length) const { return classify_point(entries_, input, length); }
+
+  private:
+    const EntryLookup& entries_;
+};
+
 }  // namespace squint::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 #endif

@@ -88,6 +88,11 @@ inline std::vector<KernelCase> kernel_cases() {
                      "classification.order=" + std::string(name == std::string_view("leg") ? "3" : "1")});
         add("pi2d, back to front",
             {unlit, method("pi2d"), "classification.table_size=64", "compositing.form=back_to_front"});
+        for (const char* name : {"pc", "pips", "pi2d", "pi1d"}) {
+            add(std::string(name) + ", unlit", {unlit, method(name), "classification.table_size=64"});
+            add(std::string(name) + ", fine steps",
+                {unlit, method(name), "classification.table_size=64", "sampling.step=0.2"});
+        }
         add("pi1d, opacities", {lit, method("pi1d"), "compositing.form=alpha", "sampling.step=0.6"});
         add("squeeze", {unlit, method("pc_mid"), "precision.preset=squeeze"});
         add("eight bits", {lit, "precision.preset=eight_bit"});

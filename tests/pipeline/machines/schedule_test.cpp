@@ -91,6 +91,20 @@ TEST(Schedule, TheDefaultUnlitRunsTheFastestKernels) {
     EXPECT_THAT(schedule.ahead, ElementsAre(Segment::locate_address));
 }
 
+TEST(Schedule, FineStepsAskForNoWideLanesOfClassification) {
+    if (!has_vectors()) GTEST_SKIP();
+    const auto fine = [](const char* method) {
+        return schedule_with({"shading.model=none", "sampling.step=0.2", "classification.table_size=64",
+                              std::string("classification.method=") + method});
+    };
+    EXPECT_THAT(fine("pc").name, HasSubstr("classify+composite.unit26"));
+    for (const char* method : {"pips", "pi2d", "pi1d"}) {
+        const Schedule schedule = fine(method);
+        EXPECT_THAT(schedule.name, HasSubstr("composite.unit26"));
+        EXPECT_THAT(schedule.missed, ElementsAre(HasSubstr("composite.unit26"))) << schedule.name;
+    }
+}
+
 TEST(Schedule, SaysWhichKernelItMissesAndWhy) {
     if (!has_vectors()) GTEST_SKIP();
     EXPECT_THAT(schedule_with({"shading.model=none"}, false).missed,
