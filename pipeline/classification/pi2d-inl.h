@@ -65,9 +65,20 @@ HWY_INLINE std::array<W, 4> between_cells(const PreIntegrated2D& m, const CellTa
     }
     return cell;
 }
+/// What the method computes of one sample: the back of a slab is the front of the next.
 template <class W>
-HWY_INLINE Slab<W> look_up(const PreIntegrated2D& m, W front, W back) {
-    const std::array<W, 4> cell = between_cells(m, m.cells, node_position(m, front), node_position(m, back));
+struct NodeSample {
+    W input;
+    EntryPosition<W> at;  // in nodes
+};
+template <class W>
+HWY_INLINE NodeSample<W> sample_of(const PreIntegrated2D& m, W input) {
+    return {input, node_position(m, input)};
+}
+template <class W>
+HWY_INLINE Slab<W> look_up(const PreIntegrated2D& m, const EntryPosition<W>& front,
+                           const EntryPosition<W>& back) {
+    const std::array<W, 4> cell = between_cells(m, m.cells, front, back);
     const W limit = largest_color(m.premultiplied, cell[3]);
     return {{min(cell[0], limit), min(cell[1], limit), min(cell[2], limit)}, cell[3]};
 }
@@ -81,11 +92,24 @@ HWY_INLINE Slab<W> translucent_part(const PreIntegrated2D& m, const CutSlab<W>& 
     take_own_depth(m.prefix, m.premultiplied, cut, length, other, slab);
     return slab;
 }
+/// The slab between nodes, in front of the wall that may end it.
+template <class W>
+HWY_INLINE Slab<W> classify(const PreIntegrated2D& m, const CutSlab<W>& cut, const EntryPosition<W>& front,
+                            const EntryPosition<W>& end, W length) {
+    const Slab<W> part = translucent_part(m, cut, look_up(m, front, end), length);
+    return finish_premultiplied(m.prefix, m.premultiplied, cut, cut.front_input, length, part);
+}
+template <class W>
+HWY_INLINE Slab<W> classify(const PreIntegrated2D& m, const NodeSample<W>& front, const NodeSample<W>& back,
+                            W length) {
+    const CutSlab<W> cut = cut_at_wall(m.prefix, front.input, back.input);
+    const bool is_cut = m.prefix.predicts && any(constant<W>(0) < cut.wall);
+    return classify(m, cut, front.at, is_cut ? node_position(m, cut.end_input) : back.at, length);
+}
 template <class W>
 HWY_INLINE Slab<W> classify(const PreIntegrated2D& m, W front, W back, W length) {
     const CutSlab<W> cut = cut_at_wall(m.prefix, front, back);
-    const Slab<W> part = translucent_part(m, cut, look_up(m, front, cut.end_input), length);
-    return finish_premultiplied(m.prefix, m.premultiplied, cut, front, length, part);
+    return classify(m, cut, node_position(m, front), node_position(m, cut.end_input), length);
 }
 
 /// Of the slab that classify gave.  What a shorter or cut slab keeps of a full one it keeps of each part; a wall
@@ -94,8 +118,8 @@ template <class W>
 HWY_INLINE FadingLight<W> fading_light(const PreIntegrated2D& m, W front, W back, W length,
                                        const Slab<W>& whole) {
     const CutSlab<W> cut = cut_at_wall(m.prefix, front, back);
-    const Slab<W> full = look_up(m, front, cut.end_input), slab = translucent_part(m, cut, full, length);
     const EntryPosition<W> f = node_position(m, front), b = node_position(m, cut.end_input);
+    const Slab<W> full = look_up(m, f, b), slab = translucent_part(m, cut, full, length);
     const auto has_wall = constant<W>(0) < cut.wall;
     const auto other = is_shorter(m.prefix.entries, length) | has_wall;
     FadingLight<W> light{static_cast<int>(m.fades.size()) + 1, {}, way_to_wall(cut, m.to_way)};

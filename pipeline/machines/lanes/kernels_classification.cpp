@@ -39,8 +39,9 @@ HWY_INLINE L sample_of(const M&, L input) {
     return input;
 }
 
+/// `samples` is nothing of the plan: what is stored there changes no constant of the method.
 template <class L, class M>
-void classify_rows(const Plan& plan, int steps, lanes::Samples& samples) {
+void classify_rows(const Plan& plan, int steps, lanes::Samples& __restrict samples) {
     const M& method = std::get<M>(plan.method);
     const Unseen<L> unseen(plan);
     const L zero = constant<L>(0);
