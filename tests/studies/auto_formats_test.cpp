@@ -76,11 +76,6 @@ TEST(AutoFormats, AreTheseOnEveryMachine) {
         formats_of(chosen({})),
         "u4.14 s1.17 u1.13 u1.7 u12.1 u12.2 u12.2 u12.1 u1.11 u1.15 u10.10 u4.12 u1.10 u1.15 u1.14 u1.15 "
         "u1.13 ");
-    EXPECT_EQ(
-        formats_of(chosen(
-            {"lights=[{headlight=true}]", "shading.gradient_floor=200", "classification.method=pips"})),
-        "u4.18 s1.21 u1.17 u1.9 u12.7 u12.7 u12.7 s12.6 s12.5 s1.13 u1.9 u12.7 u1.12 u1.13 u10.16 u10.17 "
-        "u4.17 u1.12 u1.17 s1.14 s1.13 u1.11 u1.13 u1.12 u1.13 u1.16 u1.17 u1.14 ");
 }
 
 TEST(AutoFormats, OfEveryViewKeepTheSceneBoundWithinTheBudget) {
