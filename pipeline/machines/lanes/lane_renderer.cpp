@@ -241,9 +241,20 @@ LaneRenderer::LaneRenderer(const Plan& plan, const RenderOptions& options)
     if (empty_ && !plan.projection_mode && nothing_is_black(plan)) seen_ = visible_packets(plan, *empty_);
 }
 
+namespace {
+// Whether rays may meet something that cannot be seen.
+bool hides_something(const EmptySpace& space) {
+    const auto blocks = static_cast<std::int64_t>(space.distance.size());
+    std::int64_t halves = 0;
+    for (const std::uint32_t word : space.fine) halves += std::popcount(word);
+    return space.visible_blocks < blocks || (!space.fine.empty() && halves < 8 * blocks);
+}
+}  // namespace
+
 void LaneRenderer::find_empty() {
     const std::int64_t needs = EmptySpace::bytes_for(blocks_met(plan_));
     empty_ = empty_space_of(plan_, room_);
+    if (empty_ && hides_something(*empty_)) asked_ = empty_.get();
     if (empty_)
         room_ -= EmptySpace::bytes_for(empty_->box);
     else
@@ -329,7 +340,7 @@ void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& 
         w.picked = w.pieces = {}, w.cut = {}, w.slab_light = {};
     if (walls_) w.twice = {};
     BoxSums box_sums(*plan_.volume);
-    PacketLoop loop(plan_, kernels_, schedule_, voxels_, empty_.get(), walls_.get(), &box_sums, w);
+    PacketLoop loop(plan_, kernels_, schedule_, voxels_, asked_, walls_.get(), &box_sums, w);
     const bool colors_alone = !plan_.projection_mode && image.channels.size() == 4;
     for (int y = top; y < bottom; y += kSide)
         for (int x = left; x < right; x += kSide) {

@@ -49,6 +49,7 @@ class LaneRenderer {
     StageKernels kernels_;
     Schedule schedule_;
     std::shared_ptr<const EmptySpace> empty_;
+    const EmptySpace* asked_ = nullptr;  // by rays; null where all can be seen
     std::shared_ptr<const NearWalls> walls_;
     ScreenMask seen_;
     CountSlabs count_slabs_;
