@@ -311,7 +311,10 @@ Plan make_plan(const Scene& scene, std::shared_ptr<const Volume> volume, int fra
     if (plan.lit && plan.needs_back)
         plan.stages[4].why = fmt::format("shading.inside = \"{}\"", name_of(in.inside));
     plan.inside = build_inside(in, plan.location);
-    if (looks_twice(plan)) plan.walls = build_walls(plan.entries, std::int64_t{v.largest} + 1);
+    if (looks_twice(plan)) {
+        plan.walls = build_walls(plan.entries, std::int64_t{v.largest} + 1);
+        if (!plan.walls.between(v.smallest, v.largest)) plan.walls = {};  // no cell holds one
+    }
     plan.gradient = build_gradient(in);
     if (plan.gradient.exaggerated.wanted) plan.box_gradient = build_box_gradient(in);
     plan.shading = build_shading(in);

@@ -70,6 +70,15 @@ TEST(Walls, AWallBetweenTwoSamplesIsFoundByASecondLookAlone) {
         }
 }
 
+TEST(Walls, NoneIsLookedForWhereNoVoxelReachesOne) {
+    const auto volume = plate();
+    Scene scene = plate_scene(Method::pips, WallRule::twice);
+    for (const double wall : {220.0, 221.0}) {  // the plate has 220
+        scene.transfer_function.points[1][0] = wall - 1, scene.transfer_function.points[2][0] = wall;
+        EXPECT_EQ(make_plan(scene, volume).walls.looks_twice, wall == 220);
+    }
+}
+
 TEST(Walls, ALitWallIsLitByTheGradientOfItsPiece) {
     const auto volume = plate();
     for (const Method method : {Method::pips, Method::pi1d, Method::pi2d, Method::leg}) {
