@@ -46,7 +46,7 @@ struct Drawn {
 class Rows {
   public:
     Rows(int size, std::int64_t phantom, int pairs) : size_(size), phantom_(phantom), pairs_(pairs) {
-        std::printf("%dx%d pixels, phantom of %lld^3 in 8 bits.\n\n", size, size,
+        std::printf("%dx%d pixels, a phantom of %lld^3 voxels.\n\n", size, size,
                     static_cast<long long>(phantom));
         std::puts(
             "| left out | carried along instead | scene | without, ms | with / without | same picture |\n"
@@ -54,8 +54,8 @@ class Rows {
     }
 
     Scene scene(Overrides overrides) const {
-        overrides.insert(overrides.begin(), {"volume.bits=8", fmt::format("image.width={}", size_),
-                                             fmt::format("image.height={}", size_)});
+        overrides.insert(overrides.begin(),
+                         {fmt::format("image.width={}", size_), fmt::format("image.height={}", size_)});
         return phantom_scene(phantom_, false, overrides);
     }
     static Drawn drawn(const Scene& scene, bool skip = true) {
@@ -91,8 +91,8 @@ class Rows {
     int pairs_;
 };
 
-const Overrides kFog{"transfer_function.points=[[0,1,1,1,0.002],[255,1,1,1,0.002]]"},
-    kNothing{"transfer_function.points=[[0,1,1,1,0],[255,1,1,1,0]]"};
+const Overrides kFog{"volume.bits=8", "transfer_function.points=[[0,1,1,1,0.02],[255,1,1,1,0.02]]"},
+    kNothing{"volume.bits=8", "transfer_function.points=[[0,1,1,1,0],[255,1,1,1,0]]"};
 
 Scene from_far_away(Scene scene, const Camera& camera) {
     const double distance = 1000 * camera.half_height;
@@ -117,8 +117,18 @@ void print(const Rows& t) {
               Rows::drawn(lit(t.scene(p.overrides))));
 
     const auto with_a_wall = [](Scene scene) {
-        scene.transfer_function.opacity.push_back({254, 0}),
-            scene.transfer_function.opacity.push_back({255, 1});
+        const auto volume = volume_of(scene);
+        const TransferFunction function = resolve_transfer_function(scene, *volume);
+        TransferFunctionSettings& settings = scene.transfer_function = {};
+        settings.unit_distance = function.unit_distance, settings.entries = function.entries;
+        for (const ColorPoint& p : function.color)
+            settings.color.push_back({p.value, p.color.x, p.color.y, p.color.z});
+        for (const OpacityPoint& p : function.opacity) settings.opacity.push_back({p.value, p.alpha});
+        // The last level of the type, with the function as it was up to the one before.
+        const double last = volume->largest_representable();
+        if (volume->largest + 2 > last) throw InputError("bench_left_out: the data reach the last level");
+        settings.opacity.back()[0] = last - 1;
+        settings.opacity.push_back({last, 1});
         return scene;
     };
     for (const Place& p :

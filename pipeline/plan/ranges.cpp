@@ -116,6 +116,8 @@ std::map<int, Range> proven_ranges(const Plan& plan) {
     Silent observer;
     any_slab<Range>(plan, observer);
     Range::of_wires = nullptr;
+    // Behind a ray's last slab a sample may lie a step beyond the box, before it is clamped: affine() leaves that out.
+    ranges.erase(static_cast<int>(Wire::location));
     return ranges;
 }
 

@@ -18,7 +18,8 @@ void choose_words(Plan& plan);
 double most_steps(const Plan& plan);
 
 /// The values that can reach each wire, rounded, in raw units, before its format limits them: proven by
-/// intervals over any slab of any ray, so often wider than what rays meet.  Wires of tables are left out.
+/// intervals over any slab of any ray, so often wider than what rays meet.  Locations, which are clamped to the box,
+/// and wires of tables are left out.
 std::map<int, Range> proven_ranges(const Plan& plan);
 
 }  // namespace squint

@@ -47,13 +47,14 @@ std::string answer_text(const Plan& plan, const Json& audit, const Proof& proof)
     std::string text;
     if (const auto* c = std::get_if<Certificate>(&proof))
         text = fmt::format(
-            "No {}pixel is more than {:.3g} LSB8 from the picture without rounding: proven. {} wires hold {} "
-            "bits; about {} keep it within {:g} LSB8.",
-            c->undecided_rays > 0 ? "decided " : "", c->most_decided, wires, held, enough,
-            plan.scene.precision.budget);
+            "None of {} {}rays is more than {:.3g} LSB8 from what it is without rounding: proven. {} wires "
+            "hold {} bits; about {} keep them within {:g} LSB8.",
+            c->rays - c->undecided_rays, c->undecided_rays > 0 ? "decided " : "", c->most_decided, wires,
+            held, enough, plan.scene.precision.budget);
     else
         text = "No bound is proven.";
-    return text + (overflow.empty() ? " No value overflowed." : " Values overflowed on " + overflow + ".");
+    return text + (overflow.empty() ? " No value met a format's limits."
+                                    : " Values met the limits of " + overflow + ".");
 }
 
 }  // namespace
@@ -78,7 +79,7 @@ Json profile_of(const Plan& plan, const RenderStatistics& statistics, const Proo
                                    : std::max(format.fraction_bits - zero_low_bits(s, format), 0);
         if (const auto range = proven.find(static_cast<int>(wire)); range != proven.end()) {
             const int asked = integer_bits_for(range->second, format);
-            enough.integer_bits = s.saturated + s.wrapped > 0 ? asked : std::min(asked, format.integer_bits);
+            enough.integer_bits = std::min(asked, format.integer_bits);
         }
         if (enough.integer_bits + enough.fraction_bits < 1) enough.fraction_bits = 1;
         (*found)["share_lsb8"] = share, (*found)["enough"] = to_string(enough);
@@ -93,7 +94,6 @@ Json profile_data(const Plan& plan, const Rendering& rendering, const Proof& pro
     Json audit = profile_of(plan, s, proof), wires = Json::object();
     for (const Wire wire : plan.used_wires) wires[std::string(info(wire).name)] = to_string(plan.specs[wire]);
     const auto* c = std::get_if<Certificate>(&proof);
-    const std::string name = plan.scene.name.empty() ? "the built-in scene" : plan.scene.name;
     Json not_measured = Json::array();
     if (!c)
         not_measured.push_back(
@@ -105,7 +105,7 @@ Json profile_data(const Plan& plan, const Rendering& rendering, const Proof& pro
     run.update(program_record());
     return {{"schema", "squint.report/1"},
             {"mode", "profile"},
-            {"title", "Profile of " + name},
+            {"title", "Profile of " + plan.scene.name},
             {"note", ""},
             {"file", plan.scene.name},
             {"text", to_toml(plan.scene)},

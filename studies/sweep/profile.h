@@ -19,7 +19,7 @@ using Proof = std::variant<Certificate, std::string>;
 /// An audit (json_of_audit) and, where a certificate is there, for each wire
 ///
 ///     share_lsb8   its greatest share of the bound, over the rays that are decided
-///     enough       a format: the integer bits that intervals ask for, at most today's where nothing overflowed;
+///     enough       a format: the integer bits that intervals ask for, at most today's;
 ///                  the fraction bits with which all wires together keep precision.budget by equal shares
 ///                  (studies/search/by_shares.h); a wire that was exact loses the bits that no value set.
 ///

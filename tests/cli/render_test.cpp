@@ -255,7 +255,7 @@ TEST_F(Render, AProfileIsAPageAndRefusesWhatRoundsNothing) {
     EXPECT_EQ(r.code, 0) << r.err;
     EXPECT_EQ(r.out, "");
     EXPECT_THAT(files(), ElementsAre("wires.html"));
-    EXPECT_THAT(contents(folder / "wires.html"), HasSubstr("Profile of the built-in scene"));
+    EXPECT_THAT(contents(folder / "wires.html"), HasSubstr("Profile of built-in scene"));
     expect_refusal(squint("render" + kSmall + "--profile wires.txt"), "the name must end in .html");
     expect_refusal(squint("render" + kSmall + "--set precision.preset=real --profile wires.html"),
                    "which rounds no wire");

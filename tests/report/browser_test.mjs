@@ -85,8 +85,7 @@ test('a profile shows the wires of one picture, and nothing of sweeps', async ()
     assert.notEqual(await is.shown(page, '#range-chart canvas'), null);
     assert.match(await page.textContent('#answer'), /proven/);
     const head = await page.$$eval('#range-table th', (all) => all.map((cell) => cell.textContent));
-    assert.deepEqual(head.slice(0, 2), ['wire', 'format']);
-    assert.equal(head.at(-1), 'enough');
+    assert.deepEqual(head.slice(0, 4), ['wire', 'format', 'enough', 'share of the bound']);
     const wires = await page.$$eval('#range-table tbody tr', (all) => all.map((line) => line.cells[0].textContent));
     assert.equal(wires[0], 'voxels');
     assert.ok(wires.includes('transparency') && wires.length > 12, wires.join(' '));

@@ -59,11 +59,13 @@ TEST(Profile, FormatsThatAreEnoughKeepTheBudgetAndOverflowNowhere) {
         EXPECT_LT(enough, held) << method;
         const Profiled after = profile(scene, volume);
         const double budget = scene.precision.budget;
-        // Shares add up in first order, and no pixel has the greatest of all.
-        EXPECT_LE(after.certificate.most_decided, 1.5 * budget) << method;
-        EXPECT_GT(after.certificate.most_decided, before.certificate.most_decided) << method;
+        // No pixel has the greatest share of every wire.
+        EXPECT_LE(after.certificate.most_decided, budget) << method;
+        EXPECT_GT(after.certificate.most_decided, budget / 10) << method;
         for (const auto& [name, wire] : after.wires.items()) {
-            EXPECT_EQ(wire["saturated"], before.wires[name]["saturated"]) << method << ' ' << name;
+            if (before.wires[name]["saturated"] == 0) {
+                EXPECT_EQ(wire["saturated"], 0) << method << ' ' << name;
+            }
             EXPECT_EQ(wire["wrapped"], 0) << method << ' ' << name;
         }
     }

@@ -3,13 +3,19 @@
 const percent = (part, whole) => !part ? '' : 100 * part / whole < 0.01 ? '< 0.01 %' : `${number(+(100 * part / whole).toPrecision(2))} %`;
 const partsOf = (format) => { const [, , i, f] = /^([us])(\d+)\.(\d+)/.exec(format); return { low: -f, high: +i, f: +f }; };
 
+// What intervals leave of a wire's range; nothing where they do not keep within its format.
+function provenOf(a) {
+  const { high } = partsOf(a.format), least = a.format.startsWith('s') ? -(2 ** high) : 0;
+  return a.proven_max !== undefined && a.proven_max < 2 ** high && a.proven_min >= least ? `${number(a.proven_min)} to ${number(a.proven_max)}` : '';
+}
+
 function rangeOf([wire, a]) {
   const { low, high, f } = partsOf(a.format), counts = a.magnitude_bits;
   const total = counts.reduce((sum, n, b) => b ? sum + n : 0, 0);
   let sum = 0, middle = -f;
   for (let b = 1; b < counts.length && sum < 0.5 * total; ++b) sum += counts[b], middle = b - 0.5 - f;
-  const most = Math.max(...counts.slice(1), 1), over = a.saturated + a.wrapped, proven = Math.max(Math.abs(a.proven_min ?? 0), Math.abs(a.proven_max ?? 0));
-  const tip = { wire, format: a.format, values: `${number(a.min)} to ${number(a.max)}`, ...(a.proven_max === undefined ? {} : { 'can carry': `${number(a.proven_min)} to ${number(a.proven_max)}` }),
+  const most = Math.max(...counts.slice(1), 1), over = a.saturated + a.wrapped, proven = provenOf(a) ? Math.max(-a.proven_min, a.proven_max) : 0;
+  const tip = { wire, format: a.format, values: `${number(a.min)} to ${number(a.max)}`, ...(provenOf(a) ? { 'can carry': provenOf(a) } : {}),
     'not zero': number(total), zero: number(counts[0] ?? 0), rounded: percent(a.inexact, a.count) || 'none',
     overflow: over ? `${number(a.saturated)} saturated, ${number(a.wrapped)} wrapped of ${number(a.count)}` : 'none', underflow: a.underflowed ? `${number(a.underflowed)} not zero became zero` : 'none' };
   return { wire, low, high, any: total > 0, middle, over: percent(over, a.count), under: percent(a.underflowed, a.count), tip,
@@ -31,7 +37,7 @@ async function ranges() {
     { data: { values: values.flatMap((v) => v.bins) }, mark: { type: 'bar', color: '#5d86c6' }, encoding: { x: x('from'), x2: { field: 'to' }, size: { field: 'thick', type: 'quantitative', scale: null } } },
     { transform: any, mark: { type: 'tick', thickness: 2.5, size: 14, color: kInk }, encoding: { x: x('middle') } },
     { transform: [{ filter: 'datum.enough' }], mark: { type: 'bar', height: 19, filled: false, stroke: '#0f8a6d', strokeWidth: 1.6, cornerRadius: 3 }, encoding: { x: x('enough.low'), x2: { field: 'enough.high' } } },
-    { transform: [{ filter: 'datum.proven !== null && datum.proven <= datum.high + 1' }], mark: { type: 'point', shape: 'diamond', filled: false, size: 60, stroke: kInk, strokeWidth: 1.4 }, encoding: { x: x('proven') } },
+    { transform: [{ filter: 'datum.proven !== null' }], mark: { type: 'point', shape: 'diamond', filled: false, size: 60, stroke: kInk, strokeWidth: 1.4 }, encoding: { x: x('proven') } },
     ...[['over', 'high', kBad, 'left', 'triangle-left', 1], ['under', 'low', kWarn, 'right', 'triangle-right', -1]].flatMap(([field, at, color, align, shape, way]) => [
       { transform: [{ filter: `datum.${field} != ''` }], mark: { type: 'point', shape, filled: true, size: 110, color, opacity: 1 }, encoding: { x: x(at) } },
       { transform: [{ filter: `datum.${field} != ''` }], mark: { type: 'text', align, dx: 9 * way, fontSize: 11, fontWeight: 600, color }, encoding: { x: x(at), text: { field } } },
@@ -44,10 +50,9 @@ async function ranges() {
 
 // The same in numbers; records of older versions have fewer.
 function rangeTable(audit) {
-  const all = [['wire', (a, wire) => wire, 'word'], ['format', (a) => a.format, 'word'], ['least', (a) => number(a.min)], ['greatest', (a) => number(a.max)],
-    ['can carry from', (a) => number(a.proven_min)], ['to', (a) => number(a.proven_max)], ['idle bits at the top', (a) => a.unused_high_bits], ['at the bottom', (a) => a.zero_low_bits],
-    ['rounded', (a) => percent(a.inexact, a.count)], ['to zero', (a) => percent(a.underflowed, a.count)], ['overflow', (a) => percent(a.saturated + a.wrapped, a.count)],
-    ['share of the bound', (a) => number(a.share_lsb8)], ['enough', (a) => a.enough, 'word']];
+  const all = [['wire', (a, wire) => wire, 'word'], ['format', (a) => a.format, 'word'], ['enough', (a) => a.enough, 'word'], ['share of the bound', (a) => number(a.share_lsb8)],
+    ['least', (a) => number(a.min)], ['greatest', (a) => number(a.max)], ['can carry', provenOf], ['idle at the top', (a) => a.unused_high_bits], ['at the bottom', (a) => a.zero_low_bits],
+    ['overflow', (a) => percent(a.saturated + a.wrapped, a.count)], ['to zero', (a) => percent(a.underflowed, a.count)], ['rounded', (a) => percent(a.inexact, a.count)]];
   const columns = all.filter(([, of]) => audit.some(([wire, a]) => (of(a, wire) ?? '') !== ''));
   const line = (tag, cellOf) => element('tr', {}, ...columns.map((c) => element(tag, { class: c[2] ?? '' }, String(cellOf(c) ?? ''))));
   $('range-table').replaceChildren(element('table', {}, element('thead', {}, line('th', ([name]) => name)), element('tbody', {}, ...audit.map(([wire, a]) => line('td', ([, of]) => of(a, wire))))));
