@@ -226,6 +226,7 @@ test('a copied command gives the same picture again', async () => {
     const hash = await rows.nth(i).getAttribute('data-hash');
     if (recordOf('product', hash).status !== 'done') continue;
     await rows.nth(i).locator('button').click();
+    await rows.nth(i).locator('button', { hasText: 'copied' }).waitFor(); // a busy machine takes its time
     // What lies on the clipboard, as a person gets at it.
     await page.evaluate(() => { const box = document.createElement('textarea'); box.id = 'pasted'; document.body.prepend(box); box.focus(); });
     await page.keyboard.press('Control+V');
