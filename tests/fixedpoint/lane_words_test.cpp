@@ -362,7 +362,9 @@ class FloatComparison {
         return std::ldexp(mantissa, static_cast<int>(random_() % 60) - 50);
     }
     int between(int low, int high) {
-        return low + static_cast<int>(random_() % static_cast<unsigned>(high - low + 1));
+        return static_cast<int>(
+            low +
+            static_cast<std::int64_t>(random_() % static_cast<std::uint64_t>(std::int64_t{high} - low + 1)));
     }
 
     template <class Draw, class F>

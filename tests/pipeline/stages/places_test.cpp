@@ -105,21 +105,20 @@ TEST(LightPlaces, OfARampAreTheColourOfItsScalar) {
 
 // Before a wall stands next to nothing: its gradient lights the slab.  From the wall on, it alone.
 TEST(LightPlaces, AreTheWalls) {
-    for (const char* rule : {"centroid", "two_point"})
-        for (const char* preset : {"real", "default"}) {
-            const Plan plan = plan_of(rule, "[[0,1,1,1,0],[100,1,1,1,0],[101,1,1,1,1],[255,1,1,1,1]]", preset,
-                                      {"transfer_function.entries=256"});
-            const LightPlaces<Word> there = places<Word>(plan, 0, 202), here = places<Word>(plan, 101, 202);
-            // Within one entry before the wall extinction rises: a 202nd of the way.
-            EXPECT_NEAR(way(there.far), 0.5, 1.0 / 202) << rule;
-            EXPECT_EQ(here.near, 0);
-            EXPECT_EQ(here.far, 0);
-            if (plan.inside.rule == InsideRule::two_point) {
-                EXPECT_EQ(there.far, Word{1} << (kWayBits - 1));
-                EXPECT_GT(there.share, Word{1} << (kShareBits - 1));
-                EXPECT_EQ(here.share, Word{1} << kShareBits);
-            }
+    for (const char* rule : {"centroid", "two_point"}) {
+        const Plan plan = plan_of(rule, "[[0,1,1,1,0],[100,1,1,1,0],[101,1,1,1,1],[255,1,1,1,1]]", "default",
+                                  {"transfer_function.entries=256"});
+        const LightPlaces<Word> there = places<Word>(plan, 0, 202), here = places<Word>(plan, 101, 202);
+        // Within one entry before the wall extinction rises: a 202nd of the way.
+        EXPECT_NEAR(way(there.far), 0.5, 1.0 / 202) << rule;
+        EXPECT_EQ(here.near, 0);
+        EXPECT_EQ(here.far, 0);
+        if (plan.inside.rule == InsideRule::two_point) {
+            EXPECT_EQ(there.far, Word{1} << (kWayBits - 1));
+            EXPECT_GT(there.share, Word{1} << (kShareBits - 1));
+            EXPECT_EQ(here.share, Word{1} << kShareBits);
         }
+    }
 }
 
 // A thin slab seen from its other side: u -> 1 - u.
