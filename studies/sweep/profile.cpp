@@ -7,6 +7,7 @@
 #include "studies/search/by_shares.h"
 #include "studies/sweep/evaluate.h"
 #include "studies/sweep/report.h"
+#include "studies/sweep/run_folder.h"
 
 #include <fmt/format.h>
 
@@ -29,7 +30,7 @@ search::Bits fraction_bits(const Plan& plan) {
     return bits;
 }
 
-/// The budget where formats are wished for; the pictures' own guarantee elsewhere.
+/// The page's first line: what is proven, how many bits would keep the budget, which wires met their limits.
 std::string answer_text(const Plan& plan, const Json& audit, const Proof& proof) {
     std::string overflow;
     int held = 0, enough = 0, wires = 0;
@@ -100,8 +101,8 @@ Json profile_data(const Plan& plan, const Rendering& rendering, const Proof& pro
             "Shares of a bound, and formats that are enough: " + std::get<std::string>(proof) + ".");
     not_measured.push_back(
         "Other views: values are of this picture; intervals and integer bits hold for all.");
-    Json run{{"started", ""}, {"machine", machine_record()}, {"shard", ""},       {"computed", 1},
-             {"failed", 0},   {"seconds", s.seconds},        {"command", command}};
+    Json run{{"started", now_text()}, {"machine", machine_record()}, {"shard", ""},       {"computed", 1},
+             {"failed", 0},           {"seconds", s.seconds},        {"command", command}};
     run.update(program_record());
     return {{"schema", "squint.report/1"},
             {"mode", "profile"},

@@ -26,11 +26,11 @@ void make_folder(const std::string& path) {
     if (error) throw InputError(fmt::format("{}: cannot make the folder: {}", path, error.message()));
 }
 
+}  // namespace
+
 std::string now_text() {
     return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
 }
-
-}  // namespace
 
 void make_run_folder(const std::string& folder) {
     for (const char* room : {"points", "pictures", "baselines", "runs"}) make_folder(folder + "/" + room);

@@ -15,6 +15,8 @@ void make_run_folder(const std::string& folder);
 std::string point_path(const std::string& folder, const std::string& hash);
 
 /// JSON in the form that every file of a run has.
+/// Now, in UTC: "2026-11-29T12:50:00Z".
+std::string now_text();
 std::string dump(const Json& json);
 
 /// "key=value" settings as TOML, where the last of a key wins -> {key: typed value}, in order; and back, from
