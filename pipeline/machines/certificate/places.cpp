@@ -10,7 +10,8 @@ namespace {
 
 constexpr double kAway = 0x1p-30;  // of doubles, of the rows of even matter
 
-double with(double x) {
+/// To [0, 1].
+double clamped(double x) {
     return std::clamp(x, 0.0, 1.0);
 }
 /// Both places, as parts of the way, and the share of the light that comes from the far one.
@@ -99,7 +100,7 @@ std::optional<PlacesReach> all_places(const InsideStage& s, const BoundedPrefix&
         y[i] = {least > 0 ? before.low / least : 0, most > 0 ? before.high / most : 1};
         if (is_short) y[i] = {even, even};
         if (may_be_short) y[i].take(even);
-        y[i] = {with(y[i].low - kAway), with(y[i].high + kAway)};
+        y[i] = {clamped(y[i].low - kAway), clamped(y[i].high + kAway)};
     }
     const auto square = [](const Reach& x) {
         const double a = x.low * (1 - x.low), b = x.high * (1 - x.high);
@@ -113,7 +114,7 @@ std::optional<PlacesReach> all_places(const InsideStage& s, const BoundedPrefix&
     const auto place = [&](const Reach& less) {
         const double least = std::min(turn.low * less.low, turn.high * less.low),
                      most = std::max(turn.low * less.high, turn.high * less.high);
-        return Reach{with((twelvefold.low - most) / 12), with((twelvefold.high - least) / 12)};
+        return Reach{clamped((twelvefold.low - most) / 12), clamped((twelvefold.high - least) / 12)};
     };
     const Reach depth = own_depth(f, ends, end, wall.has_value());
     const Leans at = leans_at(p.real.even, depth);
