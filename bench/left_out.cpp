@@ -4,8 +4,7 @@
 //     bench_left_out [size=400] [phantom=128] [pairs=9]
 //
 // Each row has a scene where leaving it out matters, and one where it cannot: there the two must cost the same.
-// Processor time of one thread, medians of paired frames.  Same: the two pictures have equal bits.  It prints
-// Markdown.
+// Processor time of one thread, medians of paired frames, as Markdown.  Same: the two pictures have equal bits.
 #include "bench/support/support.h"
 #include "core/error.h"
 #include "pipeline/record.h"

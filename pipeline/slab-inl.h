@@ -161,8 +161,8 @@ Accumulated<W> projected(const Plan& plan, const M& method, const ProjectedRay<W
     return pixel;
 }
 
-/// What a place on a ray has: a scalar, a gradient, light.  Stages 1, 2, 3 and 5, which know no method of
-/// classification.
+/// What a place on a ray has: a scalar, a gradient, light.  These are stages 1, 2, 3 and 5, which know
+/// no method of classification, and are compiled once a word.
 template <class W, class Voxels, class Observer = const Silent>
 class Places {
   public:

@@ -135,8 +135,8 @@ constexpr int word_of_unit(int block, int i) {
 }
 
 /// lerp() of interpolation.h, halves up, between rows row[j] and row[j] + 1 of four numbers each, for word j of L;
-/// `weight` is of 15 bits and below one.  Rows stand as UnitLanes do, and no number goes from 0 to 1 in one row: such
-/// a difference does not fit.
+/// `weight` is of 15 bits and below one.  Rows stand as UnitLanes do.  No number goes from 0 to 1 in one row, for
+/// that difference does not fit 16 bits.
 template <class L>
 HWY_INLINE std::array<UnitLanes, 4> lerp_unit_rows(const std::int16_t* rows, const std::int32_t* row,
                                                    hn::Vec<UnitLanes::D> weight) {

@@ -47,8 +47,8 @@ HWY_INLINE PrefixSample<W> sample_of(const PowerSeriesOfOrder1& m, W input) {
     return s;
 }
 
-/// The difference of a prefix sum between two samples, exact, with place_bits() more fraction bits than its
-/// words.
+/// The difference of a prefix sum between two samples, exact: it has place_bits() more fraction bits
+/// than the sum's words.
 template <class W>
 HWY_INLINE Wide<W> prefix_difference(const PrefixSample<W>& front, const PrefixSample<W>& back,
                                      std::size_t column, int place_bits) {

@@ -1,5 +1,5 @@
-// Places, pieces and light inside a slab over bounded words: where the bound is tighter than that of inside-inl.h's
-// operations.
+// Places, pieces and light inside a slab over bounded words, where a bound of the whole is tighter than those of the
+// operations in inside-inl.h, added up.
 #pragma once
 
 #include "pipeline/machines/certificate.h"

@@ -33,8 +33,8 @@ struct SeriesKernel {
 SeriesKernel series_kernel(int order, bool legendre);
 
 /// PIPS(n) and LEG(n).  Without rounding a slab is the mean extinction on its way from one input to the other, and
-/// the mean colour weighted by it: moving the ends by e moves the mean of a curve by its slope times e, for ways of
-/// any length.
+/// the mean colour weighted by it.  Moving the ends by e moves the mean of a curve by its slope times e, however
+/// short the way.
 struct BoundedPowerSeries {
     static constexpr bool kNeedsBack = true, kPremultiplied = false;
     std::variant<const PowerSeriesOfOrder1*, const MomentSeries*> words;

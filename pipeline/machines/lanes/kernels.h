@@ -130,8 +130,8 @@ struct StageKernels {
         instances[static_cast<std::size_t>(segment)] = {std::move(name), std::move(why_not_faster)};
     }
 
-    /// The entries' rows as UnitLanes (fixedpoint/words/unit_lanes-inl.h), the last one twice; empty where they do
-    /// not fit.
+    /// The entries' rows as UnitLanes (fixedpoint/words/unit_lanes-inl.h), the last one twice;
+    /// empty where a number does not fit them.
     std::vector<std::int16_t> unit_rows;
 };
 

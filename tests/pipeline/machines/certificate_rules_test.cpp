@@ -1,5 +1,5 @@
-// Rules of the certificate that no picture shows alone: each holds for whatever the words may stand for, and, halved,
-// does not.
+// Rules of the certificate that no picture shows alone: each holds for whatever the words may stand for,
+// and no longer does when it is halved.
 #include "core/portable_math.h"
 #include "core/volume_source.h"
 #include "pipeline/classification/tables/legendre.h"
