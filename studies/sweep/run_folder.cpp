@@ -183,7 +183,7 @@ Json write_record(Evaluator& evaluator, const Prepared& point, const std::string
     return record;
 }
 
-RunLog::RunLog(std::string folder, Json about) {
+RunLog::RunLog(const std::string& folder, const Json& about) {
     const auto ticks = std::chrono::system_clock::now().time_since_epoch().count();
     path_ = fmt::format("{}/runs/{:016x}-{}.json", folder, ticks, getpid());
     about_ = {{"schema", "squint.run/1"}, {"started", now_text()}, {"machine", machine_record()}};
