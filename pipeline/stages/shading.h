@@ -14,20 +14,6 @@ namespace squint {
 
 struct StageInputs;
 
-/// Shading models.  Each is a file in shading/; shading-inl.h lists them.
-struct Phong {
-    static constexpr bool kHeldToOpacity = false, kHasHighlights = true;
-};
-struct BlinnPhong {
-    static constexpr bool kHeldToOpacity = false, kHasHighlights = true;
-};
-struct Cone {
-    static constexpr bool kHeldToOpacity = false, kHasHighlights = true;
-};
-struct Gooch {
-    static constexpr bool kHeldToOpacity = true, kHasHighlights = false;
-};
-
 /// shading.inside nlpi: the normal between two is kept at length one by a quadratic (Guetat et al. 2010, equation
 /// 8 in Bernstein form).
 struct KeptLength {

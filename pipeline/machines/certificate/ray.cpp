@@ -1,6 +1,7 @@
 #include "pipeline/machines/certificate/ray.h"
 
 #include "pipeline/machines/certificate.h"
+#include "pipeline/stages/shading/models-inl.h"
 
 #include <algorithm>
 #include <cmath>
@@ -25,7 +26,8 @@ double difference(const Reach& c, const Reach& g, const Reach& d, const Reach& h
 
 // The most light that matter of a colour sends: both sums of lights are limited to one.
 double brightest_lit(const ShadingSettings& s, double color) {
-    if (s.model == ShadingModel::gooch) return 1;
+    if (HWY_NAMESPACE::with_model(s.model, [](auto model) { return decltype(model)::kHeldToOpacity; }))
+        return 1;
     return color * std::min(s.ka + s.kd, 1.0) + std::min(s.ks, 1.0);
 }
 

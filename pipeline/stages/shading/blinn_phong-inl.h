@@ -13,6 +13,10 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
+struct BlinnPhong {
+    static constexpr bool kHeldToOpacity = false, kHasHighlights = true;
+};
+
 template <class W>
 HWY_INLINE Reflection<W> reflect(BlinnPhong, const ShadingStage& s, const RayWords<W>& ray,
                                  const std::array<W, 3>& normal, W confidence) {

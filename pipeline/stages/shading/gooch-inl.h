@@ -15,6 +15,10 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
+struct Gooch {
+    static constexpr bool kHeldToOpacity = true, kHasHighlights = false;
+};
+
 template <class W>
 HWY_INLINE Reflection<W> reflect(Gooch, const ShadingStage& s, const RayWords<W>&,
                                  const std::array<W, 3>& normal, W confidence) {
