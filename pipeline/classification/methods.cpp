@@ -5,27 +5,28 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
+#include <type_traits>
+#include <utility>
 
 namespace squint {
+namespace {
+
+template <class... M>
+ClassificationMethod build_first_of(const std::variant<M...>*, const ClassificationInputs& inputs) {
+    std::optional<ClassificationMethod> built;
+    const auto build = [&]<class One>(std::type_identity<One>) {
+        if (One::serves(inputs.settings)) built = One::build(inputs);
+        return built.has_value();
+    };
+    if ((build(std::type_identity<M>{}) || ...)) return *std::move(built);
+    throw InputError(fmt::format("classification.method: {} is not known", name_of(inputs.settings.method)));
+}
+
+}  // namespace
 
 ClassificationMethod build_method(const ClassificationInputs& inputs) {
-    switch (inputs.settings.method) {
-        case Method::pc:
-        case Method::pc_mid:
-            return build_post_classification(inputs);
-        case Method::pi1d:
-        case Method::pi1d_engel:
-            return build_pre_integrated_1d(inputs);
-        case Method::pi2d:
-        case Method::pi2d_no_attenuation:
-            return build_pre_integrated_2d(inputs);
-        case Method::pips:
-            if (inputs.settings.order_or_least() == 1) return build_power_series_of_order_1(inputs);
-            return build_moment_series(inputs);
-        case Method::leg:
-            return build_moment_series(inputs);
-    }
-    throw InputError(fmt::format("classification.method: {} is not known", name_of(inputs.settings.method)));
+    return build_first_of(static_cast<const ClassificationMethod*>(nullptr), inputs);
 }
 
 namespace {

@@ -1,12 +1,13 @@
-// The one list of classification methods.  To add a method: a file beside this one, a line here, a name in
-// scene.h (docs/architecture.md).
+// The one list of classification methods.  To add a method: its files beside this one, a line here and in
+// methods-inl.h, a name in scene.h (docs/architecture.md).
 //
 // A method is a type M with
 //   static constexpr bool kPremultiplied     whether its slab colour already carries the opacity
 //   static constexpr bool kNeedsBack         whether it takes the samples at both ends of the slab
+//   serves(settings)                         whether it is the method that the settings name; one of the list is
+//   build(inputs)                            builds it, with its tables
 //   visit(v)                                 calls v(Rescale&), v(Table&) and v(CellTable&) for each it has
 //   describe(ClassificationReport&)          names its tables and choices, for `squint plan`
-//   build_...(ClassificationInputs) -> M     builds its tables
 // and, for every word, classify(const M&, front, back, length) -> Slab.
 #pragma once
 

@@ -254,7 +254,7 @@ void MomentSeries::describe(ClassificationReport& report) const {
     report.notes.push_back(note);
 }
 
-MomentSeries build_moment_series(const ClassificationInputs& in) {
+MomentSeries MomentSeries::build(const ClassificationInputs& in) {
     const bool legendre = in.settings.method == Method::leg;
     check_order(in.settings, 2, legendre ? preintegration::kMostLegendre : preintegration::kMostMoments);
     MomentSeries m;

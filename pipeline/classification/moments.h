@@ -49,6 +49,13 @@ inline constexpr MomentSquare kSmooth = [] {
 struct MomentSeries {
     static constexpr bool kPremultiplied = false;
     static constexpr bool kNeedsBack = true;
+    static bool serves(const ClassificationSettings& settings) {
+        return settings.method == Method::leg ||
+               (settings.method == Method::pips && settings.order_or_least() != 1);
+    }
+    /// Builds PIPS(2 to 5) or LEG(2 to 4).  Throws InputError for other orders.
+    static MomentSeries build(const ClassificationInputs& inputs);
+
     PrefixLookup prefix;
     Table levels;   // one column: the level's first row
     Table moments;  // depth, then moment k of channel c in column 1 + 3 k + c
@@ -89,7 +96,5 @@ struct MomentSeries {
 constexpr std::int64_t resolved_depth(int fraction, std::size_t k) {
     return std::int64_t{1} << (fraction - std::max(0, fraction - 10) / (static_cast<int>(k) + 1));
 }
-/// Builds PIPS(2 to 5) or LEG(2 to 4).  Throws InputError for other orders.
-MomentSeries build_moment_series(const ClassificationInputs& inputs);
 
 }  // namespace squint

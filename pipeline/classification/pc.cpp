@@ -2,7 +2,7 @@
 
 namespace squint {
 
-PostClassification build_post_classification(const ClassificationInputs& inputs) {
+PostClassification PostClassification::build(const ClassificationInputs& inputs) {
     return {build_entry_lookup(inputs)};
 }
 

@@ -10,6 +10,11 @@ namespace squint {
 struct PostClassification {
     static constexpr bool kPremultiplied = false;
     static constexpr bool kNeedsBack = false;
+    static bool serves(const ClassificationSettings& settings) {
+        return settings.method == Method::pc || settings.method == Method::pc_mid;
+    }
+    static PostClassification build(const ClassificationInputs& inputs);
+
     EntryLookup entries;
 
     template <class V>
@@ -18,6 +23,5 @@ struct PostClassification {
     }
     void describe(ClassificationReport& report) const { entries.describe(report); }
 };
-PostClassification build_post_classification(const ClassificationInputs& inputs);
 
 }  // namespace squint

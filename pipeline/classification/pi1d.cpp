@@ -9,7 +9,7 @@
 
 namespace squint {
 
-PreIntegrated1D build_pre_integrated_1d(const ClassificationInputs& in) {
+PreIntegrated1D PreIntegrated1D::build(const ClassificationInputs& in) {
     using preintegration::MeanOf;
     PreIntegrated1D m;
     m.prefix = build_prefix_lookup(in);

@@ -17,6 +17,11 @@ namespace squint {
 struct PreIntegrated1D {
     static constexpr bool kPremultiplied = true;
     static constexpr bool kNeedsBack = true;
+    static bool serves(const ClassificationSettings& settings) {
+        return settings.method == Method::pi1d || settings.method == Method::pi1d_engel;
+    }
+    static PreIntegrated1D build(const ClassificationInputs& inputs);
+
     enum Column {
         value = 3,
         columns = 4
@@ -45,6 +50,5 @@ struct PreIntegrated1D {
         report.add(straight);
     }
 };
-PreIntegrated1D build_pre_integrated_1d(const ClassificationInputs& inputs);
 
 }  // namespace squint

@@ -139,7 +139,7 @@ void PreIntegrated2D::describe(ClassificationReport& report) const {
                         cells.size(), entries, (entries - 2) / (cells.size() - 1) + 1));
 }
 
-PreIntegrated2D build_pre_integrated_2d(const ClassificationInputs& in) {
+PreIntegrated2D PreIntegrated2D::build(const ClassificationInputs& in) {
     const Spec color = in.specs[Wire::slab_color], alpha = in.specs[Wire::slab_alpha];
     PreIntegrated2D m;
     m.prefix = build_prefix_lookup(in);

@@ -17,6 +17,11 @@ namespace squint {
 struct PreIntegrated2D {
     static constexpr bool kPremultiplied = true;
     static constexpr bool kNeedsBack = true;
+    static bool serves(const ClassificationSettings& settings) {
+        return settings.method == Method::pi2d || settings.method == Method::pi2d_no_attenuation;
+    }
+    static PreIntegrated2D build(const ClassificationInputs& inputs);
+
     PrefixLookup prefix;
     PremultipliedRules premultiplied;
     CellTable cells;
@@ -40,6 +45,5 @@ struct PreIntegrated2D {
     int entry_reach() const { return (entries - 2) / (cells.size() - 1) + 1; }
     void describe(ClassificationReport& report) const;
 };
-PreIntegrated2D build_pre_integrated_2d(const ClassificationInputs& inputs);
 
 }  // namespace squint

@@ -23,7 +23,7 @@ void write_light_sums_as_printed(const std::vector<Entry>& entries, double step,
 
 }  // namespace
 
-PowerSeriesOfOrder1 build_power_series_of_order_1(const ClassificationInputs& in) {
+PowerSeriesOfOrder1 PowerSeriesOfOrder1::build(const ClassificationInputs& in) {
     PowerSeriesOfOrder1 m;
     const EntryRows color_rows = rows_for_color(in, kMostEntryRows);
     const int bits = color_rows.bits;

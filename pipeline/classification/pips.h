@@ -18,6 +18,11 @@ namespace squint {
 struct PowerSeriesOfOrder1 {
     static constexpr bool kPremultiplied = false;
     static constexpr bool kNeedsBack = true;
+    static bool serves(const ClassificationSettings& settings) {
+        return settings.method == Method::pips && settings.order_or_least() == 1;
+    }
+    static PowerSeriesOfOrder1 build(const ClassificationInputs& inputs);
+
     PrefixLookup prefix;
     Table moment;  // X[i], colour over depth, in three columns; a row for each of T
     std::shared_ptr<const std::vector<std::int32_t>> rows;  // T and X1 side by side, for 32-bit lanes
@@ -38,6 +43,5 @@ struct PowerSeriesOfOrder1 {
         report.add(rows_of_color);
     }
 };
-PowerSeriesOfOrder1 build_power_series_of_order_1(const ClassificationInputs& inputs);
 
 }  // namespace squint

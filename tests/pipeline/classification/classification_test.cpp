@@ -229,6 +229,21 @@ TEST(ClassificationMethods, AnOrderThatIsNotGivenIsTheLeastOfItsMethod) {
     EXPECT_THROW(hash_of("leg", "1"), InputError);
 }
 
+template <class... M>
+int types_that_serve(const std::variant<M...>*, const ClassificationSettings& settings) {
+    return (static_cast<int>(M::serves(settings)) + ...);
+}
+TEST(ClassificationMethods, EachSettingIsServedByOneType) {
+    ClassificationSettings settings;
+    for (std::size_t name = 0; name < std::size(EnumNames<Method>::names); ++name)
+        for (int order = 0; order <= 6; ++order) {
+            settings.method = static_cast<Method>(name);
+            settings.order = order == 0 ? std::nullopt : std::optional(order);
+            EXPECT_EQ(types_that_serve(static_cast<const ClassificationMethod*>(nullptr), settings), 1)
+                << name_of(settings.method) << ' ' << order;
+        }
+}
+
 TEST(PreIntegrated2D, CellsOfSixteenBitsTakeEightBytes) {
     const Entries entries = pre::cases::ramp(256);
     const Classifier c = make_classifier(entries, {Method::pi2d}, "default", 512);
