@@ -16,6 +16,9 @@
 
 #include <hwy/highway.h>
 
+#include <bit>
+#include <cstdint>
+
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
@@ -33,10 +36,10 @@ inline const Range& range_of(const Tally& word) {
     return word.proven;
 }
 
-/// Any voxel that the volume can hold, at any place.
+/// Any voxel that the volume can hold, at any place, and any sum over a box of them.
 template <class W>
 struct AnyVoxel {
-    W voxel;
+    W voxel, box_sum;
     Cell<W> cell(const std::array<W, 3>&) const {
         Cell<W> cell;
         cell.corner.fill(voxel);
@@ -49,7 +52,7 @@ struct AnyVoxel {
     }
     Neighbourhood<W> box_sums(const std::array<W, 3>&) const {
         Neighbourhood<W> near;
-        near.voxel.fill(voxel * constant<W>(kBoxSide * kBoxSide * kBoxSide));
+        near.voxel.fill(box_sum);
         return near;
     }
     W nears_wall(const WallStage&, const std::array<W, 3>&) const {
@@ -83,7 +86,10 @@ void any_slab(const Plan& plan, Observer& observer, int neighbours = 1) {
     for (const Wire wire : {Wire::direction, Wire::length}) note_wire(WordTag<W>{}, static_cast<int>(wire));
 
     const Volume& v = *plan.volume;
-    const AnyVoxel<W> voxels{any_word(WordTag<W>{}, Range{v.smallest, v.largest}, v.scalar_bits)};
+    constexpr std::int64_t kBox = kBoxSide * kBoxSide * kBoxSide;
+    const int box_bits = v.scalar_bits + static_cast<int>(std::bit_width(static_cast<std::uint64_t>(kBox)));
+    const AnyVoxel<W> voxels{any_word(WordTag<W>{}, Range{v.smallest, v.largest}, v.scalar_bits),
+                             any_word(WordTag<W>{}, Range{kBox * v.smallest, kBox * v.largest}, box_bits)};
     std::visit(
         [&](const auto& method) {
             Slabs slabs(plan, method, voxels, ray, up_to(most_slabs), observer);
