@@ -363,33 +363,19 @@ TEST_P(EveryRule, HalvedIsExceededByAPictureOfItsOwn) {
 }
 std::vector<Rule> rules() {
     std::vector<Rule> all;
-    for (const Wire wire : {Wire::location,
-                            Wire::direction,
-                            Wire::weight,
-                            Wire::length,
-                            Wire::lerp_x,
-                            Wire::lerp_y,
-                            Wire::sample,
-                            Wire::classification_input,
-                            Wire::table_color,
-                            Wire::table_alpha,
-                            Wire::table_extinction,
-                            Wire::slab_depth,
-                            Wire::slab_ratio,
-                            Wire::slab_alpha,
-                            Wire::slab_color,
-                            Wire::contribution,
-                            Wire::color,
-                            Wire::transparency,
-                            Wire::gradient,
-                            Wire::spacing,
-                            Wire::normal,
-                            Wire::confidence,
-                            Wire::light,
-                            Wire::dot,
-                            Wire::power,
-                            Wire::material,
-                            Wire::intensity,
+    for (const Wire wire : {Wire::location,     Wire::direction,
+                            Wire::weight,       Wire::length,
+                            Wire::lerp_x,       Wire::lerp_y,
+                            Wire::sample,       Wire::classification_input,
+                            Wire::table_alpha,  Wire::table_extinction,
+                            Wire::slab_depth,   Wire::slab_ratio,
+                            Wire::slab_alpha,   Wire::slab_color,
+                            Wire::contribution, Wire::color,
+                            Wire::transparency, Wire::gradient,
+                            Wire::spacing,      Wire::normal,
+                            Wire::confidence,   Wire::light,
+                            Wire::dot,          Wire::power,
+                            Wire::material,     Wire::intensity,
                             Wire::lit_color})
         all.push_back({wire, "", {}});
     // One level, not two of which half a bit each seldom meet.
@@ -405,6 +391,12 @@ std::vector<Rule> rules() {
     all.push_back({Wire::color, "straight_form", {"compositing.form=straight"}});
     return all;
 }
+    // One colour, a third of a last bit beside a word, whatever bits it has.
+    all.push_back({Wire::table_color,
+                   "",
+                   {"classification.method=pc", "compositing.mode=over",
+                    "transfer_function.points=[[0,0.333333333,0.666666667,0.333333333,0.9],"
+                    "[255,0.333333333,0.666666667,0.333333333,0.9]]"}});
 INSTANTIATE_TEST_SUITE_P(Certificate, EveryRule, ::testing::ValuesIn(rules()),
                          [](const auto& rule) { return name_of(rule.param); });
 
