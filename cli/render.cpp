@@ -215,13 +215,6 @@ void write_reference(const Job& job, const Plan& plan, const Image& reference, i
               attributes);
 }
 
-/// Rows and columns of which a profile certifies the first: some 4,000 rays say which wires pay.
-int every_for_a_profile(const Camera& camera) {
-    constexpr double kRays = 4096;
-    return std::max(1,
-                    static_cast<int>(std::sqrt(static_cast<double>(camera.width) * camera.height / kRays)));
-}
-
 /// Renders, writes and reports one picture; returns its record.
 Json render_frame(const Job& job, int frame) {
     const RenderArguments& a = job.arguments;
@@ -256,7 +249,7 @@ Json render_frame(const Job& job, int frame) {
             certificate = certify(plan, {.threads = options.threads,
                                          .channels = a.bound && !job.output.empty(),
                                          .known = a.profile.empty(),
-                                         .every = a.bound ? 1 : every_for_a_profile(plan.camera),
+                                         .every = a.bound ? 1 : every_for_some_rays(plan),
                                          .cancelled = &interrupted});
         if (!a.profile.empty()) {
             const sweep::Proof proof = obstacle ? sweep::Proof(*obstacle) : sweep::Proof(certificate);

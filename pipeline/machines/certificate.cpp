@@ -6,6 +6,7 @@
 #include "pipeline/machines/certificate/premultiplied.h"
 #include "pipeline/machines/certificate/ray.h"
 #include "pipeline/machines/certificate/stages.h"
+#include "pipeline/plan/ranges.h"
 #include "pipeline/record.h"
 #include "pipeline/render.h"
 
@@ -159,6 +160,16 @@ std::optional<std::string> what_is_not_bounded(const Plan& plan) {
         return "shading.inside adaptive cuts other slabs where precision.slab_alpha has few bits; allowed: "
                "15 or more fraction bits";
     return {};
+}
+
+int every_for_some_rays(const Plan& plan, std::size_t pictures) {
+    constexpr double kLongRay = 512;
+    const double longer = std::max(most_steps(plan) / kLongRay, 1.0),
+                 most = kSomeRays / (longer * longer * static_cast<double>(pictures));
+    int every = 1;
+    const auto along = [&](int pixels) { return static_cast<double>((pixels + every - 1) / every); };
+    while (along(plan.camera.width) * along(plan.camera.height) > std::max(most, 1.0)) ++every;
+    return every;
 }
 
 Certificate certify(const Plan& plan, const CertificateOptions& options) {

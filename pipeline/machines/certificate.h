@@ -18,6 +18,7 @@
 
 #include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -54,6 +55,11 @@ struct CertificateOptions {
     double undecided = kUndecided;  // of walls and gradients, LSB8
     const std::atomic<bool>* cancelled = nullptr;
 };
+
+/// CertificateOptions::every for an answer in seconds: at most kSomeRays rays of so many pictures of the plan's size.
+/// Rays of more than 512 samples count by the square of how many more: they take longer, and are alike.
+inline constexpr int kSomeRays = 3000;
+int every_for_some_rays(const Plan& plan, std::size_t pictures = 1);
 
 /// All figures in LSB8 (1/255).
 struct Certificate {

@@ -2,7 +2,6 @@
 
 #include "core/error.h"
 #include "pipeline/machines/certificate.h"
-#include "pipeline/plan/ranges.h"
 #include "pipeline/plan_record.h"
 #include "scene/presets.h"
 #include "studies/search/by_shares.h"
@@ -20,9 +19,6 @@ namespace {
 
 constexpr double kTermination = 0x1p-12;
 constexpr int kMostViews = 8;
-constexpr std::int64_t kMostRays = 3000;  // of all certificates of a set of formats
-// Rays of more samples count by the square of how many more: they take longer, and are alike.
-constexpr double kLongRay = 512;
 // Of the budget, where rays are left out: others may be a little worse.
 constexpr double kOfSomeRays = 0.85;
 constexpr int kRaises = 12, kTakenBack = 3;
@@ -36,7 +32,7 @@ class Choice {
     Choice(const Scene& scene, std::shared_ptr<const Volume> volume, const AutoSettings& settings)
         : scene_(scene), volume_(std::move(volume)) {
         scene_.precision.preset = "default";
-        double longer = 1;  // than kLongRay
+        int every = 1;
         const bool every_view = scene.precision.guarantee == Guarantee::scene;
         const int frames = every_view ? 1 : std::max(scene_.camera.turntable, 1),
                   views = std::min(frames, kMostViews);
@@ -47,7 +43,8 @@ class Choice {
                 throw InputError(
                     fmt::format("{}: found \"auto\", but {}", at(scene, "precision.preset"), *obstacle));
             if (view == 0) base_ = plan.specs, pictures.least = least_bits(plan);
-            longer = std::max(longer, most_steps(plan) / kLongRay);
+            if (!every_view)
+                every = std::max(every, every_for_some_rays(plan, static_cast<std::size_t>(views)));
             for (const Wire wire : plan.used_wires)
                 if (!scene.precision.override_[static_cast<std::size_t>(wire)])
                     bits[wire] = base_[wire].format.fraction_bits;
@@ -61,14 +58,12 @@ class Choice {
         };
         pictures.decided_rays = true;
         pictures.certificate = {.threads = settings.threads,
-                                .every = 1,
+                                .every = every,
                                 .undecided = scene.precision.budget / 4,
                                 .cancelled = settings.cancelled};
         if (every_view)
             pictures.every_view = {
                 .threads = settings.threads, .most_beams = kBeamsOnTheWay, .cancelled = settings.cancelled};
-        else
-            while (static_cast<double>(rays()) * longer * longer > kMostRays) ++pictures.certificate.every;
     }
     Choice(const Choice&) = delete;
     Choice& operator=(const Choice&) = delete;
@@ -84,12 +79,6 @@ class Choice {
     Pictures pictures;
 
   private:
-    std::int64_t rays() const {
-        const int every = pictures.certificate.every;
-        const auto along = [&](int pixels) { return std::int64_t{(pixels + every - 1) / every}; };
-        return along(scene_.image.width) * along(scene_.image.height) *
-               static_cast<std::int64_t>(pictures.count);
-    }
     Scene scene_of(const Bits& some) const {
         Scene scene = scene_;
         for (const auto& item : some)
