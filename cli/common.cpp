@@ -76,13 +76,18 @@ std::shared_ptr<const Volume> load(const Scene& scene, std::vector<std::string>&
 
 std::shared_ptr<const Volume> load_and_complete(const SceneArguments& arguments, Scene& scene,
                                                 std::vector<std::string>& notes,
-                                                std::vector<std::string>& warnings, std::int64_t max_bytes) {
+                                                std::vector<std::string>& warnings, std::int64_t max_bytes,
+                                                bool progress) {
     auto volume = load(scene, notes, max_bytes);
     complete_from_data(scene, *volume, notes);
     if (is_of_data(file_of(arguments.file), arguments.overrides)) frame_data(scene, *volume);
     const Interruptible here;
-    const search::AutoFormats chosen =
-        search::choose_formats(scene, volume, {.threads = 0, .cancelled = &interrupted});
+    StatusLine line(progress && scene.precision.preset == "auto");
+    const search::AutoFormats chosen = search::choose_formats(
+        scene, volume, {.threads = 0, .cancelled = &interrupted, .progress = [&](const std::string& text) {
+                            line.show(text);
+                        }});
+    line.clear();
     notes.insert(notes.end(), chosen.notes.begin(), chosen.notes.end());
     warnings.insert(warnings.end(), chosen.warnings.begin(), chosen.warnings.end());
     return volume;
@@ -159,6 +164,17 @@ void StatusLine::show(const std::string& text, bool last) {
     last_ = std::chrono::steady_clock::now();
     const std::string line = printable(text);
     std::fputs((terminal_ ? "\r\033[K" + line : line + "\n").c_str(), stderr);
+}
+
+void ProgressBar::operator()(double part) {
+    const std::lock_guard lock(mutex_);
+    const int percent = static_cast<int>(100 * part);
+    if (percent <= percent_ || !line_.due()) return;
+    percent_ = percent;
+    const std::string bar(static_cast<std::size_t>(percent * 2 / 5), '#'),
+        head = what_.empty() ? "" : what_ + ": ";
+    line_.show(line_.rewrites() ? fmt::format("{}[{:<40}] {:3} %", head, bar, percent)
+                                : fmt::format("{}{} %", head, percent));
 }
 
 std::string text_of_time(double seconds) {

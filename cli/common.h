@@ -9,8 +9,10 @@
 #include <atomic>
 #include <chrono>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace squint::cli {
@@ -36,11 +38,12 @@ Scene scene_of_volume(const std::string& name_or_file, const std::vector<std::st
 
 /// Loads the scene's volume, and refuses one beyond `max_bytes` (0: no limit).  A scene without a transfer
 /// function gets the data's own; where the arguments name a volume in place of a scene, the camera frames what it
-/// shows.  The preset `auto` gets its formats; `warnings` hears where its budget is not met.
+/// shows.  The preset `auto` gets its formats; `warnings` hears where its budget is not met, and a terminal,
+/// with `progress`, of every proof.
 std::shared_ptr<const Volume> load_and_complete(const SceneArguments& arguments, Scene& scene,
                                                 std::vector<std::string>& notes,
                                                 std::vector<std::string>& warnings,
-                                                std::int64_t max_bytes = 0);
+                                                std::int64_t max_bytes = 0, bool progress = true);
 
 /// Loads the scene's volume, at most `max_bytes` (0: no limit).  `notes` receives what a user should know.
 std::shared_ptr<const Volume> load(const Scene& scene, std::vector<std::string>& notes,
@@ -72,6 +75,20 @@ class StatusLine {
   private:
     bool shown_, terminal_;
     std::chrono::steady_clock::time_point last_;
+};
+
+/// A progress bar on a terminal's standard error; elsewhere a line every ten seconds.  Takes parts from any thread.
+class ProgressBar {
+  public:
+    /// `what`: before the bar, with a colon; may be empty.
+    explicit ProgressBar(bool wanted, std::string what = {}) : line_(wanted), what_(std::move(what)) {}
+    void operator()(double part);
+
+  private:
+    StatusLine line_;
+    std::string what_;
+    int percent_ = -1;
+    std::mutex mutex_;
 };
 
 /// "3.2 s", "12 min 5 s", "3 h 20 min".

@@ -103,7 +103,8 @@ int run(const PlanArguments& a) {
     std::optional<SceneBound> bound;
     if (a.bound) {
         const Interruptible here;
-        bound = bound_scene(plan, {.cancelled = &interrupted});
+        ProgressBar proof(true, "proof");
+        bound = bound_scene(plan, {.cancelled = &interrupted, .progress = [&](double part) { proof(part); }});
     }
     if (a.json) {
         nlohmann::ordered_json record = json_of_plan(plan);

@@ -26,7 +26,6 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <mutex>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -46,27 +45,6 @@ struct RenderArguments {
 };
 
 using Json = nlohmann::ordered_json;
-
-/// A progress bar on a terminal's standard error; elsewhere a line every ten seconds.
-class ProgressBar {
-  public:
-    explicit ProgressBar(bool wanted) : line_(wanted) {}
-    void operator()(double part) {
-        const std::lock_guard lock(mutex_);
-        const int percent = static_cast<int>(100 * part);
-        if (percent <= percent_) return;
-        if (!line_.due()) return;
-        percent_ = percent;
-        const std::string bar(static_cast<std::size_t>(percent * 2 / 5), '#');
-        line_.show(line_.rewrites() ? fmt::format("[{:<40}] {:3} %", bar, percent)
-                                    : fmt::format("{} %", percent));
-    }
-
-  private:
-    StatusLine line_;
-    int percent_ = -1;
-    std::mutex mutex_;
-};
 
 /// "out.exr" -> "out.0007.exr" for a turntable.
 std::string frame_path(const std::string& path, int frame, int frames) {
@@ -245,12 +223,15 @@ Json render_frame(const Job& job, int frame) {
             errors = rounding_errors(plan, rendering.image, options, frame);
         }
         const auto obstacle = a.profile.empty() ? std::nullopt : what_is_not_bounded(plan);
-        if (a.bound || (!a.profile.empty() && !obstacle))
+        if (a.bound || (!a.profile.empty() && !obstacle)) {
+            ProgressBar proof(!a.quiet, "proof");
             certificate = certify(plan, {.threads = options.threads,
                                          .channels = a.bound && !job.output.empty(),
                                          .known = a.profile.empty(),
                                          .every = a.bound ? 1 : every_for_some_rays(plan),
-                                         .cancelled = &interrupted});
+                                         .cancelled = &interrupted,
+                                         .progress = [&](double part) { proof(part); }});
+        }
         if (!a.profile.empty()) {
             const sweep::Proof proof = obstacle ? sweep::Proof(*obstacle) : sweep::Proof(certificate);
             page = sweep::report_html(sweep::profile_data(plan, rendering, proof, a.command), "");
@@ -342,7 +323,7 @@ int run(const RenderArguments& a) {
     Scene scene = read(a.scene);
     if (a.print_scene) {
         std::vector<std::string> unread, warnings;
-        load_and_complete(a.scene, scene, unread, warnings, a.max_memory);
+        load_and_complete(a.scene, scene, unread, warnings, a.max_memory, !a.quiet);
         return print(to_toml(scene)), kDone;
     }
     const bool audited = a.options.audit || !a.profile.empty();
@@ -353,7 +334,7 @@ int run(const RenderArguments& a) {
     refuse_beyond(a.max_memory, image_bytes(scene),
                   fmt::format("a picture of {}x{} pixels", scene.image.width, scene.image.height));
     std::vector<std::string> notes, of_formats;
-    const auto volume = load_and_complete(a.scene, scene, notes, of_formats, a.max_memory);
+    const auto volume = load_and_complete(a.scene, scene, notes, of_formats, a.max_memory, !a.quiet);
     const Job job{a, scene, volume, output, preview, of_formats};
     if (!a.quiet)
         for (const std::string& note : notes) say(fmt::format("  note: {}\n", message_text(note)));

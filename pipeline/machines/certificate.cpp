@@ -183,14 +183,17 @@ Certificate certify(const Plan& plan, const CertificateOptions& options) {
         image = &all.image;
     }
     std::vector<Row> rows(static_cast<std::size_t>(plan.camera.height));
+    const int every = std::max(options.every, 1), wanted = (plan.camera.height + every - 1) / every;
     std::atomic<bool> stopped{false};
+    std::atomic<int> done{0};
     tbb::task_arena arena(threads_for(options.threads));
     const auto certify_all = [&](const auto& method) {
         arena.execute([&] {
             tbb::parallel_for(0, plan.camera.height, [&](int row) {
                 if (options.cancelled && *options.cancelled) stopped = true;
-                if (!stopped && row % std::max(options.every, 1) == 0)
-                    certify_row(plan, method, row, options, image, rows[static_cast<std::size_t>(row)]);
+                if (stopped || row % every != 0) return;
+                certify_row(plan, method, row, options, image, rows[static_cast<std::size_t>(row)]);
+                if (options.progress) options.progress(static_cast<double>(++done) / wanted);
             });
         });
     };

@@ -20,6 +20,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -54,6 +55,7 @@ struct CertificateOptions {
     int every = 1;                  // rows and columns: the first of so many
     double undecided = kUndecided;  // of walls and gradients, LSB8
     const std::atomic<bool>* cancelled = nullptr;
+    std::function<void(double)> progress{};  // gets the part done, from any thread
 };
 
 /// CertificateOptions::every for an answer in seconds: at most kSomeRays rays of so many pictures of the plan's size.

@@ -115,6 +115,9 @@ class Search {
                 waiting_.pop();
             }
             add(halves);
+            if (options_.progress)
+                options_.progress(
+                    std::min(static_cast<double>(used_) / static_cast<double>(options_.most_beams), 1.0));
             if (used_ < look) continue;
             if (top() > 0.9 * before && look > kFirstLook) break;
             before = top(), look *= 4;

@@ -10,6 +10,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -19,6 +20,7 @@ struct SceneBoundOptions {
     int threads = 0;                    // 0: one a processor
     std::int64_t most_beams = 1 << 18;  // no more are bounded; the result depends on nothing else
     const std::atomic<bool>* cancelled = nullptr;
+    std::function<void(double)> progress{};  // gets the part of `most_beams` done; fewer may be enough
 };
 
 /// All figures in LSB8 (1/255), each a bound of every pixel of every view.

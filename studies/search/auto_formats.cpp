@@ -64,6 +64,12 @@ class Choice {
         if (every_view)
             pictures.every_view = {
                 .threads = settings.threads, .most_beams = kBeamsOnTheWay, .cancelled = settings.cancelled};
+        if (settings.progress)
+            pictures.proven = [&settings, proofs = 0,
+                               budget = scene.precision.budget](const Proof& proof) mutable {
+                settings.progress(fmt::format("formats: {} proofs; bound {:.4g} of {:g} LSB8", ++proofs,
+                                              proof.most, budget));
+            };
     }
     Choice(const Choice&) = delete;
     Choice& operator=(const Choice&) = delete;

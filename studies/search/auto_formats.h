@@ -6,6 +6,7 @@
 #include "scene/scene.h"
 
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,6 +16,7 @@ namespace squint::search {
 struct AutoSettings {
     int threads = 0;  // 0: one a processor; the formats do not depend on them
     const std::atomic<bool>* cancelled = nullptr;
+    std::function<void(const std::string&)> progress{};  // a line after every proof
 };
 
 struct AutoFormats {
