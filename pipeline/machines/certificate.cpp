@@ -150,7 +150,6 @@ std::optional<std::string> what_is_not_bounded(const Plan& plan) {
             "allowed: ends, twice",
             name_of(walls));
     if (!plan.lit) return {};
-    if (plan.gradient.exaggerated.wanted) return "shading.exaggeration is not bounded yet; allowed: 0";
     if (lights_fade(plan.inside.rule) && std::holds_alternative<PreIntegrated2D>(plan.method))
         return fmt::format(
             "shading.inside {} is not bounded yet for classification.method {}; allowed: mean, "

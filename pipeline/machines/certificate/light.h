@@ -27,6 +27,7 @@ struct Neighbourhood<Bounded> {
     const Volume* volume = nullptr;
     std::array<std::int64_t, 3> cell{};
     Neighbourhood<Int128> words;
+    bool of_sums = false;  // over the 5^3 voxels about each
 };
 
 }  // namespace squint::HWY_NAMESPACE
@@ -44,8 +45,8 @@ requires std::same_as<W, Bounded> W stage_constant(std::int64_t raw, double exac
 /// The differences of voxels that a gradient's rule lerps.
 class DifferenceField {
   public:
-    DifferenceField(const Volume& volume, GradientRule rule, int axis)
-        : volume_(volume), rule_(rule), axis_(static_cast<std::size_t>(axis)) {}
+    DifferenceField(const HWY_NAMESPACE::Neighbourhood<Bounded>& near, GradientRule rule, int axis)
+        : near_(near), rule_(rule), axis_(static_cast<std::size_t>(axis)) {}
     using Place = std::array<std::int64_t, 3>;
 
     bool is_edge() const { return rule_ == GradientRule::analytic; }
@@ -63,7 +64,9 @@ class DifferenceField {
     }
     /// How far two of them may lie apart.
     double range() const {
-        const auto levels = static_cast<double>(volume_.largest - volume_.smallest);
+        constexpr double kSummed = kBoxSide * kBoxSide * kBoxSide;
+        const auto levels = static_cast<double>(near_.volume->largest - near_.volume->smallest) *
+                            (near_.of_sums ? kSummed : 1);
         return levels * (is_edge() ? 2 : rule_ == GradientRule::sobel ? 32 : 2);
     }
     /// The steepest change along each axis over cells.
@@ -96,13 +99,10 @@ class DifferenceField {
         p[axis] += by;
         return p;
     }
-    double value(const Place& p) const {
-        const Index3& d = volume_.dims;
-        return static_cast<double>(volume_.at(voxel_at(p[0], d.x), voxel_at(p[1], d.y), voxel_at(p[2], d.z)));
-    }
+    double value(const Place& p) const;
     double central(const Place& p) const { return value(beside(p, axis_, 1)) - value(beside(p, axis_, -1)); }
 
-    const Volume& volume_;
+    const HWY_NAMESPACE::Neighbourhood<Bounded>& near_;
     GradientRule rule_;
     std::size_t axis_;
 };
@@ -183,7 +183,7 @@ inline Bounded voxel_difference(const GradientStage& s, const HWY_NAMESPACE::Nei
     if (s.rule == GradientRule::cubic_spline) return bounded_spline(s, near, weight, axis);
     const Int128 word = HWY_NAMESPACE::voxel_difference(
         s, near.words, std::array<Int128, 3>{weight[0].v, weight[1].v, weight[2].v}, axis);
-    const DifferenceField field(*near.volume, s.rule, axis);
+    const DifferenceField field(near, s.rule, axis);
     const int bits = s.weight_bits;
     // Between the differences at the cell's corners; analytic has no lerp along the axis itself.
     std::array<std::int64_t, 8> at{};
@@ -291,6 +291,19 @@ inline Bounded confidence(const GradientStage& s, const std::array<Bounded, 3>& 
         for (const Bounded& x : g)
             if (!x.exact) error.add(x.error, off * one / reach.sum);
     }
+    return with_error(word, error);
+}
+
+/// An error of g changes its length by no more than its own.
+inline Bounded gradient_length(const std::array<Bounded, 3>& g) {
+    const Int128 word = HWY_NAMESPACE::gradient_length(std::array<Int128, 3>{g[0].v, g[1].v, g[2].v});
+    const GradientReach reach(g);
+    if (!std::isfinite(reach.sum)) return unbounded(word);
+    const double one = std::ldexp(1.0, kNormalGuard);
+    Shares error;
+    add_local(error, std::abs(in_double(word) - reach.length * one), {});
+    for (const Bounded& x : g)
+        if (!x.exact) error.add(x.error, reach.off * one / reach.sum);
     return with_error(word, error);
 }
 

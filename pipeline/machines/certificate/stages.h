@@ -83,9 +83,7 @@ struct BoundedVolume {
     template <class W>
     auto neighbourhood(const std::array<W, 3>& at) const;
     template <class W>
-    auto box_sums(const std::array<W, 3>& at) const {
-        return neighbourhood(at);
-    }
+    auto box_sums(const std::array<W, 3>& at) const;
 };
 
 /// The voxel nearest to a point, and all those that its location's error may make the nearest.
@@ -196,10 +194,30 @@ auto BoundedVolume::neighbourhood(const std::array<W, 3>& at) const {
     const HWY_NAMESPACE::FromVolume voxels{volume};
     const std::array<Int128, 3> cell{at[0].v, at[1].v, at[2].v};
     return HWY_NAMESPACE::Neighbourhood<W>{
-        &volume,
-        {static_cast<std::int64_t>(cell[0]), static_cast<std::int64_t>(cell[1]),
-         static_cast<std::int64_t>(cell[2])},
-        voxels.neighbourhood(cell)};
+        &volume, {to_index(at[0]), to_index(at[1]), to_index(at[2])}, voxels.neighbourhood(cell), false};
+}
+template <class W>
+auto BoundedVolume::box_sums(const std::array<W, 3>& at) const {
+    const HWY_NAMESPACE::FromVolume voxels{volume};
+    const std::array<Int128, 3> cell{at[0].v, at[1].v, at[2].v};
+    return HWY_NAMESPACE::Neighbourhood<W>{
+        &volume, {to_index(at[0]), to_index(at[1]), to_index(at[2])}, voxels.box_sums(cell), true};
+}
+
+inline double DifferenceField::value(const Place& p) const {
+    const Volume& volume = *near_.volume;
+    const Place at{voxel_at(p[0], volume.dims.x), voxel_at(p[1], volume.dims.y),
+                   voxel_at(p[2], volume.dims.z)};
+    if (!near_.of_sums) return static_cast<double>(volume.at(at[0], at[1], at[2]));
+    std::array<int, 3> from_cell{};
+    bool is_near = true;
+    for (std::size_t a = 0; a < 3; ++a) {
+        from_cell[a] = static_cast<int>(p[a] - near_.cell[a]) + 1;
+        is_near = is_near && 0 <= from_cell[a] && from_cell[a] < 4;
+    }
+    if (is_near) return static_cast<double>(near_.words.at(from_cell[0], from_cell[1], from_cell[2]));
+    const HWY_NAMESPACE::FromVolume voxels{volume};
+    return static_cast<double>(voxels.box_sums(std::array<Int128, 3>{at[0], at[1], at[2]}).at(1, 1, 1));
 }
 
 /// Whether a cell holds a wall, in all cells that the point may lie in.

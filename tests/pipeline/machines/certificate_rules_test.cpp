@@ -223,18 +223,17 @@ TEST(CertificateRules, OfAdaptivePiecesHoldAndHalvedDoNot) {
     EXPECT_GT(wrong_of_half, 0);
 }
 
-// The gradient of a spline where its place may be another: a quadratic field, and noise.
-TEST(CertificateRules, OfSplinesHoldAndHalvedDoNot) {
-    const Plan plan = plan_with({"shading.gradient=cubic_spline", "precision.preset=wide"}),
-               real = real_plan(plan);
+// A difference of voxels where its place may be another: a quadratic field, and noise.  `near(voxels, cell)`: what it is of.
+template <class Near>
+void check_differences(const char* rule, const GradientStage& s, const GradientStage& real,
+                       const Near& near) {
     const ProceduralField square{
         "square", "", 8, 16, [](const Vec3& p) { return p.x * p.x; }, [](const Vec3&) { return Vec3(); }};
-    const int bits = plan.gradient.weight_bits;
-    const double whole = std::ldexp(1.0, bits);
+    const double whole = std::ldexp(1.0, s.weight_bits);
     Ratio ratio;
     for (const ProceduralField* field : {&square, &noise_field()}) {
         const Volume volume = make_procedural(*field, {9, 9, 9}, 8);
-        const BoundedVolume bounded{volume, bits};
+        const BoundedVolume bounded{volume, s.weight_bits};
         const HWY_NAMESPACE::FromVolume exact{volume};
         for (unsigned seed = 1; seed <= 3000; ++seed) {
             Draw draw(seed);
@@ -253,17 +252,44 @@ TEST(CertificateRules, OfSplinesHoldAndHalvedDoNot) {
                 moved[a].v = (there - static_cast<double>(moved_cell[a])) * whole;
             }
             for (int axis = 0; axis < 3; ++axis) {
-                const Bounded slope =
-                    voxel_difference(plan.gradient, bounded.neighbourhood(cell), weight, axis);
+                const Bounded slope = voxel_difference(s, near(bounded, cell), weight, axis);
                 std::array<Exact, 3> place;
                 for (std::size_t a = 0; a < 3; ++a) place[a].v = static_cast<double>(moved_cell[a]);
-                const double is =
-                    HWY_NAMESPACE::voxel_difference(real.gradient, exact.neighbourhood(place), moved, axis).v;
+                const double is = HWY_NAMESPACE::voxel_difference(real, near(exact, place), moved, axis).v;
                 ratio.take(std::abs(is - in_double(slope.v)), slope.most());
             }
         }
     }
-    ratio.check("splines");
+    ratio.check(rule);
+}
+TEST(CertificateRules, OfSplinesHoldAndHalvedDoNot) {
+    const Plan plan = plan_with({"shading.gradient=cubic_spline", "precision.preset=wide"}),
+               real = real_plan(plan);
+    check_differences("splines", plan.gradient, real.gradient,
+                      [](const auto& voxels, const auto& cell) { return voxels.neighbourhood(cell); });
+}
+TEST(CertificateRules, OfSumsOfVoxelsHoldAndHalvedDoNot) {
+    const Plan plan = plan_with({"shading.exaggeration=1", "precision.preset=wide"}), real = real_plan(plan);
+    check_differences("sums", plan.box_gradient, real.box_gradient,
+                      [](const auto& voxels, const auto& cell) { return voxels.box_sums(cell); });
+}
+TEST(CertificateRules, OfLengthsOfGradientsHoldAndHalvedDoNot) {
+    Ratio ratio;
+    for (unsigned seed = 1; seed <= 3000; ++seed) {
+        Draw draw(seed);
+        std::array<Bounded, 3> bounded;
+        std::array<Exact, 3> moved;
+        const double off = draw.real(0, 0.3) * (draw.once_in(2) ? 1 : -1);
+        const Vec3 g = draw.vector(-1, 1) * 4096;
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto a = static_cast<std::size_t>(axis);
+            bounded[a] = off_by(static_cast<std::int64_t>(g[axis]), std::abs(off * g[axis]));
+            moved[a].v = in_double(bounded[a].v) + off * g[axis];
+        }
+        const Bounded length = gradient_length(bounded);
+        ratio.take(std::abs(HWY_NAMESPACE::gradient_length(moved).v - in_double(length.v)), length.most());
+    }
+    ratio.check("lengths of gradients");
 }
 
 // nlpi: the arc between two normals.
