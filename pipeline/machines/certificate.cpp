@@ -150,11 +150,6 @@ std::optional<std::string> what_is_not_bounded(const Plan& plan) {
             "allowed: ends, twice",
             name_of(walls));
     if (!plan.lit) return {};
-    if (lights_fade(plan.inside.rule) && std::holds_alternative<PreIntegrated2D>(plan.method))
-        return fmt::format(
-            "shading.inside {} is not bounded yet for classification.method {}; allowed: mean, "
-            "front, middle, centroid, two_point, adaptive",
-            name_of(plan.inside.rule), name_of(plan.scene.classification.method));
     if (plan.inside.rule == InsideRule::adaptive && plan.inside.one_alpha < 1 << 15)
         return "shading.inside adaptive cuts other slabs where precision.slab_alpha has few bits; allowed: "
                "15 or more fraction bits";
@@ -203,8 +198,8 @@ Certificate certify(const Plan& plan, const CertificateOptions& options) {
     if (const auto* words = std::get_if<PostClassification>(&plan.method)) {
         certify_all(BoundedPostClassification{*words, function});
     } else if (const auto* cells = std::get_if<PreIntegrated2D>(&plan.method)) {
-        certify_all(
-            BoundedCells{*cells, std::get<PreIntegrated2D>(real.method), function, prefix_of(*cells)});
+        certify_all(BoundedCells{*cells, std::get<PreIntegrated2D>(real.method), function, prefix_of(*cells),
+                                 cells->fades});
     } else if (const auto* means = std::get_if<PreIntegrated1D>(&plan.method)) {
         const Function of_means = Function::of_means(plan, means->is_opacity);
         certify_all(BoundedMeans{*means, std::get<PreIntegrated1D>(real.method), function, of_means,

@@ -94,15 +94,14 @@ TEST_F(ByCertificate, SaysWhoBindsWhereABoundCannotBeMet) {
 
 TEST_F(ByCertificate, RefusesWhatIsNotBoundedInOneLine) {
     Settings s = small(1);
-    s.overrides.insert(s.overrides.end(),
-                       {"lights=[{headlight=true}]", "classification.method=pi2d", "shading.inside=linear"});
+    s.overrides.insert(s.overrides.end(), {"classification.method=pips", "classification.as_printed=true"});
     try {
         run_by_certificate(s);
-        FAIL() << "light that fades was not refused";
+        FAIL() << "a formula as printed was not refused";
     } catch (const InputError& error) {
         EXPECT_THAT(
             error.what(),
-            HasSubstr("--guarantee pictures: the built-in scene: shading.inside linear is not bounded yet"));
+            HasSubstr("--guarantee pictures: the built-in scene: classification.as_printed is not bounded"));
     }
 }
 

@@ -7,6 +7,8 @@
 #include "pipeline/machines/certificate/inside.h"
 #include "pipeline/machines/certificate/payers.h"
 
+#include <vector>
+
 namespace squint {
 
 /// `real`: the same method in the plan that rounds nothing.
@@ -15,6 +17,7 @@ struct BoundedCells {
     const PreIntegrated2D &words, &real;
     const Function& function;
     BoundedPrefix prefix;
+    const std::vector<CellTable>& fades;  // the words': the composition asks for light where there are any
 };
 struct BoundedMeans {
     static constexpr bool kNeedsBack = true, kPremultiplied = true;
@@ -26,5 +29,8 @@ Slab<Bounded> classify(const BoundedCells& m, const Bounded& front, const Bounde
                        const Bounded& length);
 Slab<Bounded> classify(const BoundedMeans& m, const Bounded& front, const Bounded& back,
                        const Bounded& length);
+/// linear, nlpi: where light lies in the slab that classify gave.
+FadingLight<Bounded> fading_light(const BoundedCells& m, const Bounded& front, const Bounded& back,
+                                  const Bounded& length, const Slab<Bounded>& whole);
 
 }  // namespace squint

@@ -200,6 +200,13 @@ TEST(LitCertificate, IsExceededByNoPixelOfPicturesDrawnAtRandom) {
 TEST(LitCertificate, OfExaggeratedNormalsIsExceededByNoPixelOfPicturesDrawnAtRandom) {
     draw_pictures(true, 60, {"shading.exaggeration=1.3"});
 }
+TEST(LitCertificate, OfLightThatFadesByTablesIsExceededByNoPixelOfPicturesDrawnAtRandom) {
+    for (const char* rule : {"linear", "nlpi"})
+        for (const char* method : {"pi2d", "pi2d_no_attenuation"})
+            draw_pictures(
+                true, 15,
+                {std::string("classification.method=") + method, std::string("shading.inside=") + rule});
+}
 
 // Where a wall may be missed, and nothing dims a slab's colours: brighter than any entry.
 TEST(Certificate, KnowsThatColoursWhichNothingDimsPassTheCurves) {
@@ -305,9 +312,6 @@ TEST(Certificate, RefusesWhatItDoesNotBoundInOneLine) {
     EXPECT_THAT(refusal({small, dark, "classification.method=pips", "classification.opaque_prediction=none",
                          "transfer_function.points=[[0, 1, 1, 1, 0], [255, 1, 1, 1, 1]]"}),
                 HasSubstr("allowed: ends, twice"));
-    for (const char* rule : {"linear", "nlpi"})
-        EXPECT_THAT(refusal({small, "classification.method=pi2d", std::string("shading.inside=") + rule}),
-                    HasSubstr(fmt::format("shading.inside {} is not bounded yet", rule)));
     EXPECT_THAT(refusal({small, "classification.method=pips", "shading.inside=adaptive",
                          "precision.slab_alpha=u1.12"}),
                 HasSubstr("15 or more fraction bits"));
@@ -321,6 +325,7 @@ struct Rule {
     Wire wire;
     std::string name;                   // empty: the wire's
     std::vector<std::string> settings;  // of all its pictures
+    bool lit = false;                   // as the wires of gradients and light are
 };
 std::string name_of(const Rule& rule) {
     return rule.name.empty() ? std::string(info(rule.wire).name) : rule.name;
@@ -329,7 +334,7 @@ class EveryRule : public ::testing::TestWithParam<Rule> {};
 TEST_P(EveryRule, HalvedIsExceededByAPictureOfItsOwn) {
     const Wire wire = GetParam().wire;
     const std::string name = name_of(GetParam());
-    const bool lit = info(wire).stage == "gradient" || info(wire).stage == "shading";
+    const bool lit = GetParam().lit || info(wire).stage == "gradient" || info(wire).stage == "shading";
     double best = 0;
     for (unsigned seed = 1; seed <= 400; ++seed) {
         Draw draw(seed + 7777);
@@ -407,6 +412,10 @@ std::vector<Rule> rules() {
                    {"shading.exaggeration=1.3", "shading.inside=front", "shading.model=phong", "shading.ka=0",
                     "shading.kd=1", "shading.ks=0", "lights=[{headlight=true}]", "camera.azimuth=0",
                     "camera.elevation=0", "classification.method=pc"}});
+    const std::vector<std::string> by_tables{"classification.method=pi2d", "compositing.mode=over",
+                                             "shading.inside=nlpi"};
+    all.push_back({Wire::slab_color, "parts_of_light", by_tables, true});
+    all.push_back({Wire::classification_input, "ends_of_parts_of_light", by_tables, true});
     all.push_back({Wire::color, "straight_form", {"compositing.form=straight"}});
     return all;
 }
