@@ -344,10 +344,11 @@ std::vector<Evaluator::BaselineScene> Evaluator::baselines_of(const Prepared& po
     if (sweep_.measure.reference) {
         Scene exact = plain;
         exact.precision = {};
-        all.push_back({"reference",
-                       key("reference", exact,
-                           {"image.background", "sampling.", "classification.", "compositing.form"}),
-                       exact});
+        all.push_back(
+            {"reference",
+             key("reference", exact,
+                 {"image.background", "sampling.", "classification.", "shading.inside", "compositing.form"}),
+             exact});
     }
     for (const Baseline& named : sweep_.baselines) {
         Scene scene = plain;

@@ -173,6 +173,31 @@ TEST(SweepPoint, MendsAPresetThatDoesNotFit) {
     EXPECT_EQ(evaluator.prepare(points[1]).failure, "");
 }
 
+// The exact integral knows no slabs: rules of their light, methods and steps share one picture of it.
+TEST(SweepPoint, SharesItsReferenceWithAllThatTheExactIntegralDoesNotKnow) {
+    const SweepFile sweep = parsed(kTiny +
+                                   "[[axis]]\nname = 'way'\nsettings = [\n"
+                                   "{ label = 'a', lights = [{ headlight = true }], classification.method = "
+                                   "'pips', shading.inside = 'mean' },\n"
+                                   "{ label = 'b', lights = [{ headlight = true }], classification.method = "
+                                   "'pi2d', shading.inside = 'nlpi' },\n"
+                                   "{ label = 'c', lights = [{ headlight = true }], sampling.step = 0.5 },\n"
+                                   "{ label = 'd', lights = [] },\n"
+                                   "{ label = 'e', lights = [{ headlight = true }], shading.ks = 0 }]\n"
+                                   "[measure]\nreal = false\nreference = true\n");
+    Evaluator evaluator(sweep, "");
+    std::vector<std::string> keys;
+    for (const Point& point : expand(sweep, {})) {
+        const Prepared p = evaluator.prepare(point);
+        ASSERT_EQ(p.failure, "");
+        keys.push_back(evaluator.baseline_keys(p).at(0));
+    }
+    EXPECT_EQ(keys[0], keys[1]);
+    EXPECT_EQ(keys[0], keys[2]);
+    EXPECT_NE(keys[0], keys[3]);
+    EXPECT_NE(keys[0], keys[4]);
+}
+
 TEST(SweepPoint, MeasuresNoErrorWhereNothingIsRounded) {
     const SweepFile sweep = parsed(kTiny + "precision.preset = 'real'\n");
     Evaluator evaluator(sweep, "");
