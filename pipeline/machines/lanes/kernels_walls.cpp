@@ -34,41 +34,61 @@ HWY_INLINE std::array<L, 3> load_three(const lanes::Batch (&from)[3], int at) {
     return {load<L>(from[0].v + at), load<L>(from[1].v + at), load<L>(from[2].v + at)};
 }
 
-/// The bits of cells, a vector at a time.
+/// Bits of cells, a vector at a time.
 class WallBits {
     static constexpr int kBits = lanes::kBlockBits;
+    static constexpr hn::ScalableTag<Word> d{};
 
   public:
     HWY_INLINE explicit WallBits(const NearWalls& near)
         : bits_(reinterpret_cast<const Word*>(near.bits.data())),
+          about_(reinterpret_cast<const Word*>(near.about.data())),
           row_(static_cast<Word>(near.box.blocks.x)),
           slice_(static_cast<Word>(near.box.blocks.x * near.box.blocks.y)),
+          about_row_(static_cast<Word>(NearWalls::words_a_row(near.box))),
+          about_slice_(static_cast<Word>(about_row_ * 2 * near.box.blocks.y)),
           low_{static_cast<Word>(near.box.low.x), static_cast<Word>(near.box.low.y),
                static_cast<Word>(near.box.low.z)} {}
 
-    /// One where cell (x, y, z) is wanted and holds a wall, else zero.  Others may lie outside the box.
+    /// One where a cell is wanted and holds a wall, else zero.  Others may lie outside the box.
     template <class Mask>
-    HWY_INLINE Words operator()(Mask wanted, Words x, Words y, Words z) const {
-        const hn::ScalableTag<Word> d;
-        const auto block_along = [&](Words cell, int axis) SQUINT_WRITTEN_OUT {
-            return hn::Sub(hn::ShiftRight<kBits>(cell), hn::Set(d, low_[axis]));
+    HWY_INLINE Words operator()(Mask wanted, const Words (&at)[3]) const {
+        const auto block_along = [&](int a) SQUINT_WRITTEN_OUT {
+            return hn::Sub(hn::ShiftRight<kBits>(at[a]), hn::Set(d, low_[a]));
         };
-        const auto block =
-            hn::Add(block_along(x, 0), hn::Add(hn::Mul(hn::Set(d, row_), block_along(y, 1)),
-                                               hn::Mul(hn::Set(d, slice_), block_along(z, 2))));
+        const auto block = place(block_along(0), block_along(1), block_along(2), row_, slice_);
         const auto inside = hn::Set(d, lanes::kBlock - 1);
-        const auto cell = hn::Or(hn::And(x, inside), hn::Or(hn::ShiftLeft<kBits>(hn::And(y, inside)),
-                                                            hn::ShiftLeft<2 * kBits>(hn::And(z, inside))));
-        const auto place = hn::Add(hn::ShiftLeft<std::countr_zero(unsigned{NearWalls::kWords})>(block),
-                                   hn::ShiftRight<5>(cell));
-        const auto word = hn::GatherIndex(d, bits_, hn::IfThenElseZero(wanted, place));
-        const auto bit = hn::And(hn::Shr(word, hn::And(cell, hn::Set(d, 31))), hn::Set(d, 1));
-        return hn::IfThenElseZero(wanted, bit);
+        const auto cell =
+            hn::Or(hn::And(at[0], inside), hn::Or(hn::ShiftLeft<kBits>(hn::And(at[1], inside)),
+                                                  hn::ShiftLeft<2 * kBits>(hn::And(at[2], inside))));
+        return bit_of(wanted, bits_,
+                      hn::Add(hn::ShiftLeft<std::countr_zero(unsigned{NearWalls::kWords})>(block),
+                              hn::ShiftRight<5>(cell)),
+                      cell);
+    }
+    /// The same, where it may be that a cell beside it does.
+    template <class Mask>
+    HWY_INLINE Words about(Mask wanted, const Words (&at)[3]) const {
+        const auto two_along = [&](int a) SQUINT_WRITTEN_OUT {
+            return hn::Sub(hn::ShiftRight<1>(at[a]), hn::Set(d, 2 * low_[a]));
+        };
+        const Words x = two_along(0);
+        return bit_of(wanted, about_,
+                      place(hn::ShiftRight<5>(x), two_along(1), two_along(2), about_row_, about_slice_), x);
     }
 
   private:
-    const Word* bits_;
-    Word row_, slice_, low_[3];
+    static HWY_INLINE Words place(Words x, Words y, Words z, Word row, Word slice) {
+        return hn::Add(x, hn::Add(hn::Mul(hn::Set(d, row), y), hn::Mul(hn::Set(d, slice), z)));
+    }
+    template <class Mask>
+    static HWY_INLINE Words bit_of(Mask wanted, const Word* words, Words place, Words bit) {
+        const auto word = hn::GatherIndex(d, words, hn::IfThenElseZero(wanted, place));
+        const auto found = hn::And(hn::Shr(word, hn::And(bit, hn::Set(d, 31))), hn::Set(d, 1));
+        return hn::IfThenElseZero(wanted, found);
+    }
+    const Word *bits_, *about_;
+    Word row_, slice_, about_row_, about_slice_, low_[3];
 };
 
 /// Packs those of slabs [0, steps) of rays that go on which met no wall but have one in a cell on their way, and
@@ -76,66 +96,75 @@ class WallBits {
 template <class L>
 int gather_second_looks(const Plan& plan, const NearWalls& near, const lanes::RayPacket& rays,
                         const lanes::PixelPacket& pixels, int steps, const Samples& s, LitSamples& slabs) {
+    static_assert(L::count() <= kLanes);
     const hn::ScalableTag<Word> d;
     const auto zero = hn::Zero(d);
     const Word one = plan.float32 ? std::bit_cast<Word>(static_cast<float>(plan.inside.one_alpha))
                                   : static_cast<Word>(plan.inside.one_alpha);
     const bool per_ray = plan.lit && plan.shading.needs_ray();
     const WallBits walls(near);
-    const auto at_sample = [&](auto wanted, int at) SQUINT_WRITTEN_OUT {
-        return walls(wanted, hn::Load(d, s.cell[0].v + at), hn::Load(d, s.cell[1].v + at),
-                     hn::Load(d, s.cell[2].v + at));
+    // Places of the samples half-way along slabs.
+    const auto find_half_way = [&](int at, Word(&cell)[3][kLanes]) {
+        for (int i = 0; i < kLanes; i += static_cast<int>(L::count())) {
+            const CellPosition<L> position = cell_position(
+                plan.location, location_between(plan.inside, load_three<L>(s.location, at + i),
+                                                load_three<L>(s.location, at + kRays + i), 1, 1));
+            for (std::size_t a = 0; a < 3; ++a) store_whole(position.cell[a], cell[a] + i);
+        }
     };
-    constexpr int kStep = std::max(kLanes, static_cast<int>(L::count()));
-    alignas(64) Word middle[3][kStep];
     int count = 0;
-    for (int r = 0; r < kRays; r += kStep) {
+    for (int r = 0; r < kRays; r += kLanes) {
+        const auto goes_on = hn::Gt(hn::Load(d, pixels.active.v + r), zero);
+        if (hn::AllFalse(d, goes_on)) continue;
+        const auto last = hn::Load(d, rays.slabs.v + r);
+        auto wall_in_front = zero;  // that at the back of the slab before, where it was asked for
+        bool knows_front = false;
         for (int row = 0; row < steps; ++row) {
-            const int first = row * kRays + r;
+            const int at = row * kRays + r;
+            const bool knew_front = knows_front;
+            knows_front = false;
             // Slabs behind a ray's last one have a location of their own, but are none.
-            const auto open = [&](int at) SQUINT_WRITTEN_OUT {
-                const int ray = at % kRays;
-                const auto there = hn::And(hn::Gt(hn::Load(d, rays.slabs.v + ray), hn::Set(d, s.first + row)),
-                                           hn::Gt(hn::Load(d, pixels.active.v + ray), zero));
-                return hn::And(there, hn::Lt(hn::Load(d, s.alpha.v + at), hn::Set(d, one)));
+            const auto there = hn::And(goes_on, hn::Gt(last, hn::Set(d, s.first + row)));
+            const auto open = hn::And(there, hn::Lt(hn::Load(d, s.alpha.v + at), hn::Set(d, one)));
+            if (hn::AllFalse(d, open)) continue;
+            const Words front[3] = {hn::Load(d, s.cell[0].v + at), hn::Load(d, s.cell[1].v + at),
+                                    hn::Load(d, s.cell[2].v + at)};
+            const Words back[3] = {hn::Load(d, s.cell[0].v + at + kRays),
+                                   hn::Load(d, s.cell[1].v + at + kRays),
+                                   hn::Load(d, s.cell[2].v + at + kRays)};
+            // Up to cells side by side, those on the way lie beside the front's.
+            const auto apart = [&](int a) SQUINT_WRITTEN_OUT { return hn::Abs(hn::Sub(back[a], front[a])); };
+            const auto far = hn::Gt(hn::Max(hn::Max(apart(0), apart(1)), apart(2)), hn::Set(d, 1));
+            const auto near_one = hn::And(open, hn::Or(far, hn::Gt(walls.about(open, front), zero)));
+            if (hn::AllFalse(d, near_one)) continue;
+            if (!knew_front) wall_in_front = walls(there, front);
+            const auto wall_behind = walls(there, back);
+            auto wall = hn::Or(wall_in_front, wall_behind);
+            wall_in_front = wall_behind, knows_front = true;
+            const auto open_so_far = hn::And(near_one, hn::Eq(wall, zero));
+            if (!hn::AllFalse(d, open_so_far)) {
+                alignas(64) Word cell[3][kLanes];
+                find_half_way(at, cell);
+                const Words middle[3] = {hn::Load(d, cell[0]), hn::Load(d, cell[1]), hn::Load(d, cell[2])};
+                wall = hn::Or(wall, walls(open_so_far, middle));
+            }
+            const auto wanted = hn::And(open, hn::Gt(wall, zero));
+            if (hn::AllFalse(d, wanted)) continue;
+            const Packing packing(wanted);
+            const auto pack = [&](const Word* from, lanes::Batch& to) {
+                packing(hn::Load(d, from), to.v + count);
             };
-            bool any_open = false;
-            for (int i = 0; i < kStep; i += kLanes) any_open = any_open || !hn::AllFalse(d, open(first + i));
-            if (!any_open) continue;
-            for (int i = 0; i < kStep; i += static_cast<int>(L::count())) {
-                const CellPosition<L> position = cell_position(
-                    plan.location, location_between(plan.inside, load_three<L>(s.location, first + i),
-                                                    load_three<L>(s.location, first + kRays + i), 1, 1));
-                for (std::size_t a = 0; a < 3; ++a) store_whole(position.cell[a], middle[a] + i);
+            packing(hn::Iota(d, at), slabs.from.v + count);
+            for (int end = 0; end < 2; ++end) {
+                for (int a = 0; a < 3; ++a) pack(s.location[a].v + at + end * kRays, slabs.location[end][a]);
+                pack(s.input.v + at + end * kRays, slabs.input[end]);
             }
-            for (int i = 0; i < kStep; i += kLanes) {
-                const int at = first + i, ray = at % kRays;
-                auto wanted = open(at);
-                if (hn::AllFalse(d, wanted)) continue;
-                const auto half_way = walls(wanted, hn::Load(d, middle[0] + i), hn::Load(d, middle[1] + i),
-                                            hn::Load(d, middle[2] + i));
-                const auto there =
-                    hn::Or(half_way, hn::Or(at_sample(wanted, at), at_sample(wanted, at + kRays)));
-                wanted = hn::And(wanted, hn::Gt(there, zero));
-                if (hn::AllFalse(d, wanted)) continue;
-                const Packing packing(wanted);
-                const auto pack = [&](const Word* from, lanes::Batch& to) {
-                    packing(hn::Load(d, from), to.v + count);
-                };
-                packing(hn::Iota(d, at), slabs.from.v + count);
-                for (int end = 0; end < 2; ++end) {
-                    for (int a = 0; a < 3; ++a)
-                        pack(s.location[a].v + at + end * kRays, slabs.location[end][a]);
-                    pack(s.input.v + at + end * kRays, slabs.input[end]);
-                }
-                pack(s.length.v + at, slabs.length);
-                for (int a = 0; per_ray && a < 3; ++a) {
-                    pack(rays.view[a].v + ray, slabs.view[a]);
-                    for (int l = 0; l < plan.shading.lights; ++l)
-                        pack(rays.half[l][a].v + ray, slabs.half[l][a]);
-                }
-                count += packing.count();
+            pack(s.length.v + at, slabs.length);
+            for (int a = 0; per_ray && a < 3; ++a) {
+                pack(rays.view[a].v + r, slabs.view[a]);
+                for (int l = 0; l < plan.shading.lights; ++l) pack(rays.half[l][a].v + r, slabs.half[l][a]);
             }
+            count += packing.count();
         }
     }
     if (count == 0) return 0;

@@ -34,9 +34,51 @@ void mark_block(const Volume& volume, const WallStage& walls, const Index3& firs
             }
 }
 
+// Of four cells along an axis, the twos in whose reach each one is: those from the one before the first on.
+constexpr int kReach[kBlock][2] = {{0, 1}, {1, 2}, {1, 2}, {2, 3}};
+// The twos in reach of any of four cells along x, bit i of `cells` cell i, the two before the first in bit 0.
+constexpr std::uint32_t in_reach(std::uint32_t cells) {
+    std::uint32_t twos = 0;
+    for (int x = 0; x < kBlock; ++x)
+        if (cells >> x & 1) twos |= 1U << kReach[x][0] | 1U << kReach[x][1];
+    return twos;
+}
+
+// Fills `about` from `bits`, a layer of it at a time.
+void mark_about(NearWalls& near) {
+    const Index3& n = near.box.blocks;
+    const std::int64_t row_words = NearWalls::words_a_row(near.box);
+    near.about.assign(static_cast<std::size_t>(NearWalls::words_about(near.box)), 0);
+    const auto mark_row = [&](std::int64_t row, std::int64_t first, std::uint32_t twos) {
+        for (int i = 0; i < 4; ++i)
+            if (const std::int64_t x = first + i; twos >> i & 1 && x >= 0 && x < 2 * n.x)
+                near.about[static_cast<std::size_t>(row * row_words + x / 32)] |= 1U << x % 32;
+    };
+    // Of the sixteen cells of a block's layer.
+    const auto mark_layer = [&](std::int64_t layer, std::int64_t x, std::int64_t y, std::uint32_t cells) {
+        for (int line = 0; line < kBlock; ++line)
+            if (const std::uint32_t twos = in_reach(cells >> kBlock * line & 15); twos != 0)
+                for (const int reach : kReach[line])
+                    if (const std::int64_t two = 2 * y - 1 + reach; two >= 0 && two < 2 * n.y)
+                        mark_row(layer * 2 * n.y + two, 2 * x - 1, twos);
+    };
+    tbb::parallel_for(std::int64_t{0}, 2 * n.z, [&](std::int64_t layer) {
+        const std::int64_t last = std::min(2 * layer + 2, kBlock * n.z - 1);
+        for (std::int64_t z = std::max(2 * layer - 1, std::int64_t{0}); z <= last; ++z)
+            for (std::int64_t y = 0; y < n.y; ++y)
+                for (std::int64_t x = 0; x < n.x; ++x) {
+                    const std::int64_t block = ((z >> kBlockBits) * n.y + y) * n.x + x;
+                    const std::int64_t cells = z % kBlock * kBlock * kBlock;
+                    const std::uint32_t word =
+                        near.bits[static_cast<std::size_t>(block * NearWalls::kWords + cells / 32)];
+                    if (word != 0) mark_layer(layer, x, y, word >> cells % 32 & 0xFFFF);
+                }
+    });
+}
+
 NearWalls find_walls(const Volume& volume, const BlockBox& box, const WallStage& walls) {
     const std::shared_ptr<const BlockRanges> ranges = block_ranges(volume, box);
-    NearWalls near{box, {}};
+    NearWalls near{box, {}, {}};
     near.bits.assign(static_cast<std::size_t>(box.count()) * NearWalls::kWords, 0);
     const Index3 &n = box.blocks, &known = ranges->box.blocks;
     tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
@@ -54,6 +96,7 @@ NearWalls find_walls(const Volume& volume, const BlockBox& box, const WallStage&
                     mark_block<std::uint16_t>(volume, walls, first, bits);
             }
     });
+    mark_about(near);
     return near;
 }
 

@@ -148,5 +148,30 @@ TEST(Walls, ACellHoldsOneWhereItsCornersReachAnOpaqueEntry) {
     }
 }
 
+TEST(Walls, LanesFirstAskForWallsAboutTwoCellsAlongEachAxis) {
+    // A few voxels of wall: at corners, in the middle, on both sides of a block of cells.
+    const auto volume = volume_of({70, 9, 10}, 8, Vec3(1), [](const Index3& p) {
+        for (const Index3& wall : {Index3(0, 0, 0), Index3(5, 4, 4), Index3(12, 7, 3), Index3(68, 8, 9)})
+            if (p.x == wall.x && p.y == wall.y && p.z == wall.z) return 220;
+        return 10;
+    });
+    const Plan plan = make_plan(plate_scene(Method::pips, WallRule::twice), volume);
+    const auto near = lanes::near_walls(*volume, lanes::all_blocks_of(*volume), plan.walls);
+    const auto holds = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
+        return x >= 0 && y >= 0 && z >= 0 && x < 69 && y < 8 && z < 9 && near->at(x, y, z);
+    };
+    int without = 0;
+    for (std::int64_t z = 0; z < 9; ++z)
+        for (std::int64_t y = 0; y < 8; ++y)
+            for (std::int64_t x = 0; x < 69; ++x) {
+                bool about = false;
+                for (int i = 0; i < 64; ++i)
+                    about |= holds(x / 2 * 2 - 1 + i % 4, y / 2 * 2 - 1 + i / 4 % 4, z / 2 * 2 - 1 + i / 16);
+                ASSERT_EQ(near->about_at(x, y, z), about) << x << ' ' << y << ' ' << z;
+                without += !about;
+            }
+    EXPECT_GT(without, 4000);  // of 4968
+}
+
 }  // namespace
 }  // namespace squint
