@@ -47,6 +47,11 @@ struct Notes {
     bool met[kRays];                   // something lit, and so visible
 };
 
+// Pieces of packed slabs, as they are classified.
+struct alignas(64) PieceColors {
+    Batch color[3], alpha;
+};
+
 // The buffers of one packet: about 60 KiB, most of them touched only where light falls.
 struct Workspace {
     RayPacket rays;
@@ -57,8 +62,9 @@ struct Workspace {
     LitSamples lit;
     LitSamples ends;  // ends of slabs that are lit by the gradients there
     EndGradients end_gradients;
-    LitSamples picked, pieces;  // slabs lit in one number of pieces, and these pieces
-    LitSamples twice;           // slabs looked at twice
+    LitSamples picked, pieces;                 // slabs lit in one number of pieces, and these pieces
+    LitSamples twice;                          // slabs looked at twice
+    PieceColors looked[1 << kSecondLookBits];  // and the pieces of each
     SlabLight slab_light;
     Samples cut;
     Samples beside;  // neighbours that a gradient is computed from
@@ -277,14 +283,27 @@ class PacketLoop {
             if (plan_.shares_ends()) move(end, end);
     }
 
-    // Packs what is visible and not hidden, lights it, and puts it back.  Returns its number.
+    // Packs what is visible and not hidden, lights it, and puts it back.  Returns its number, without slabs that are
+    // looked at twice where nobody asks for normals.
     int light(int steps) {
         Samples& s = here();
         LitSamples& lit = w_.lit;
         if (!backwards_) kernels_.hide(plan_, w_.rays, w_.pixels, steps, s);
+        for (int i = 0; i < looked_; ++i) {
+            Word& alpha = s.alpha.v[w_.twice.from.v[i]];
+            w_.twice.alpha.v[i] = alpha;
+            if (!notes_) alpha = 0;
+        }
         const int count = kernels_.gather_lit(plan_, w_.rays, steps, s, lit);
         if (plan_.shares_ends()) find_end_gradients(steps);
-        if (count == 0) return 0;
+        for (int i = 0; i < looked_; ++i) s.alpha.v[w_.twice.from.v[i]] = w_.twice.alpha.v[i];
+        if (count > 0) light_as_wholes(count);
+        if (looked_ > 0) light_second_looks();
+        return count;
+    }
+    // Packed slabs, by shading.inside.
+    void light_as_wholes(int count) {
+        LitSamples& lit = w_.lit;
         if (plan_.inside.rule == InsideRule::middle)
             kernels_.place_between(plan_, lit, 0, count, 1, 1, lit, 0);
         if (lights_between_ends(plan_.inside.rule)) {
@@ -298,8 +317,6 @@ class PacketLoop {
         }
         put_back(count, lit);
         if (plan_.inside.rule == InsideRule::adaptive) light_as_it_turns(count);
-        if (plan_.walls.looks_twice) put_back_second_looks();
-        return count;
     }
 
     // By gradients between the ends', at one place or two, or by light that fades.
@@ -362,35 +379,65 @@ class PacketLoop {
             for (int at = 0; at < many; at += kRays) {
                 kernels_.cut(plan_, w_.picked, at, bits, w_.cut);
                 kernels_.classify(plan_, 1 << bits, w_.cut);
-                light_sixteen(w_.picked, at, bits);
+                light_sixteen(w_.picked, at, std::min(kRays, many - at), bits);
             }
             if (notes_) note_pieces(many, w_.picked);
             put_back(many, w_.picked);
         }
     }
-    // Lights the pieces of sixteen slabs that were cut and classified, and joins them.
-    void light_sixteen(LitSamples& slabs, int at, int bits) {
-        const int count = kRays << bits;
-        std::copy_n(w_.cut.alpha.v, count, w_.pieces.alpha.v);
-        for (int c = 0; c < 3; ++c) std::copy_n(w_.cut.color[c].v, count, w_.pieces.color[c].v);
-        for (int to = 0, part = 1; to < count; to += kRays, part += 2) {
-            kernels_.place_between(plan_, slabs, at, kRays, part, bits + 1, w_.pieces, to);
+    // Lights what is visible of the pieces of sixteen slabs that were cut and classified, and joins them.  Slabs from
+    // `many` on repeat others.
+    void light_sixteen(LitSamples& slabs, int at, int many, int bits) {
+        Samples& cut = w_.cut;
+        LitSamples& pieces = w_.pieces;
+        copy_pieces(cut, 0, kRays << bits, pieces, 0);
+        for (int row = 0; row < 1 << bits; ++row) {
+            const int to = row * kRays;
+            kernels_.place_between(plan_, slabs, at, kRays, 2 * row + 1, bits + 1, pieces, to);
             for (int a = 0; plan_.shading.needs_ray() && a < 3; ++a) {
-                std::copy_n(slabs.view[a].v + at, kRays, w_.pieces.view[a].v + to);
+                std::copy_n(slabs.view[a].v + at, kRays, pieces.view[a].v + to);
                 for (int l = 0; l < plan_.shading.lights; ++l)
-                    std::copy_n(slabs.half[l][a].v + at, kRays, w_.pieces.half[l][a].v + to);
+                    std::copy_n(slabs.half[l][a].v + at, kRays, pieces.half[l][a].v + to);
             }
         }
+        int from[kRays << kMostCuts], count = 0;  // where those that are lit lay
+        for (int i = 0; i < kRays << bits; ++i) {
+            if (i % kRays >= many) continue;
+            if (pieces.alpha.v[i] > 0)
+                copy_piece(i, count), from[count++] = i;
+            else
+                for (Batch& color : cut.color) color.v[i] = 0;
+        }
+        if (count > 0) light_pieces(count);
+        for (int i = count; i-- > 0;) {  // the normal of a slab is that of its first visible piece
+            for (int c = 0; c < 3; ++c) cut.color[c].v[from[i]] = pieces.color[c].v[i];
+            for (int a = 0; notes_ && a < 3; ++a)
+                slabs.normal[a].v[at + from[i] % kRays] = pieces.normal[a].v[i];
+        }
+        kernels_.join(plan_, cut.color, cut.alpha, bits, slabs, at);
+    }
+    void light_pieces(int count) {
+        for (int i = count; i % kRays != 0; ++i) copy_piece(count - 1, i);
         find_gradients(count, w_.pieces);
         if (const int as_sums = bits_of_pieces(plan_.inside, plan_.gradient))
             lengthen_gradients(count, as_sums, w_.pieces);
         shade(count, w_.pieces);
-        kernels_.join(plan_, w_.pieces.color, w_.pieces.alpha, bits, slabs, at);
-        // The normal of a slab is that of its first visible piece.
-        for (int r = 0; notes_ && r < kRays; ++r) {
-            int piece = 0;
-            while (piece + 1 < 1 << bits && w_.pieces.alpha.v[piece * kRays + r] <= 0) ++piece;
-            for (int a = 0; a < 3; ++a) slabs.normal[a].v[at + r] = w_.pieces.normal[a].v[piece * kRays + r];
+    }
+    // What is known of a piece before it is lit.
+    void copy_piece(int from, int to) {
+        if (from == to) return;
+        LitSamples& pieces = w_.pieces;
+        const auto copy = [&](Batch& wire) { wire.v[to] = wire.v[from]; };
+        copy(pieces.alpha);
+        for (int a = 0; a < 3; ++a) {
+            copy(pieces.color[a]);
+            if (plan_.gradient_from_samples())
+                copy(pieces.location[0][a]);
+            else
+                copy(pieces.cell[a]), copy(pieces.weight[a]);
+            if (!plan_.shading.needs_ray()) continue;
+            copy(pieces.view[a]);
+            for (int l = 0; l < plan_.shading.lights; ++l) copy(pieces.half[l][a]);
         }
     }
     void note_pieces(int count, const LitSamples& slabs) {
@@ -401,34 +448,58 @@ class PacketLoop {
         }
     }
 
-    // Slabs with a wall in a cell on their way, and none found, are made of pieces between samples inside them,
-    // which are lit by gradients of their own.
+    // Slabs with a wall in a cell on their way, and none found, are made of pieces between samples inside them.
     void look_twice(int steps) {
         LitSamples& slabs = w_.twice;
         looked_ = kernels_.gather_second_looks(plan_, *walls_, w_.rays, w_.pixels, steps, here(), slabs);
         refined_.looked_twice += looked_;
-        constexpr int kBits = kSecondLookBits;
+        constexpr int kBits = kSecondLookBits, kPieces = 1 << kBits;
+        Samples& cut = w_.cut;
         for (int at = 0; at < looked_; at += kRays) {
-            Samples& cut = w_.cut;
             kernels_.cut(plan_, slabs, at, kBits, cut);
             kernels_.place_samples_between(plan_, slabs, at, kBits, cut);
-            kernels_.prefetch(voxels_, 1, 1 << kBits, cut);
-            kernels_.fetch(voxels_, 1, 1 << kBits, cut);
-            kernels_.interpolate(plan_, 1, 1 << kBits, cut);
-            kernels_.classify(plan_, 1 << kBits, cut);
-            if (plan_.lit)
-                light_sixteen(slabs, at, kBits);
-            else
-                kernels_.join(plan_, cut.color, cut.alpha, kBits, slabs, at);
+            kernels_.prefetch(voxels_, 1, kPieces, cut);
+            kernels_.fetch(voxels_, 1, kPieces, cut);
+            kernels_.interpolate(plan_, 1, kPieces, cut);
+            kernels_.classify(plan_, kPieces, cut);
+            kernels_.join(plan_, cut.color, cut.alpha, kBits, slabs, at);
+            for (int piece = 0; plan_.lit && piece < kPieces; ++piece)
+                copy_pieces(cut, piece * kRays, kRays, w_.looked[piece], at);
         }
         Samples& s = here();
         for (int i = 0; i < looked_; ++i) s.alpha.v[slabs.from.v[i]] = slabs.alpha.v[i];
         put_back(looked_, slabs);
     }
-    // Their pieces' light, in place of the whole slabs'.
-    void put_back_second_looks() {
-        put_back(looked_, w_.twice);
-        if (notes_) note_pieces(looked_, w_.twice);
+    // Light of those that are seen, by gradients of their pieces' own.
+    void light_second_looks() {
+        const LitSamples& all = w_.twice;
+        LitSamples& slabs = w_.picked;
+        for (int i = 0, count = 0; i < looked_; ++i) {
+            if (all.alpha.v[i] > 0) pick_second_look(i, count++);
+            if (count == 0 || (count < kRays && i + 1 < looked_)) continue;
+            light_sixteen(slabs, 0, count, kSecondLookBits);
+            put_back(count, slabs);
+            if (notes_) note_pieces(count, slabs);
+            count = 0;
+        }
+    }
+    void pick_second_look(int i, int to) {
+        const LitSamples& all = w_.twice;
+        LitSamples& slabs = w_.picked;
+        slabs.from.v[to] = all.from.v[i];
+        for (int end = 0; end < 2; ++end)
+            for (int a = 0; a < 3; ++a) slabs.location[end][a].v[to] = all.location[end][a].v[i];
+        for (int a = 0; plan_.shading.needs_ray() && a < 3; ++a) {
+            slabs.view[a].v[to] = all.view[a].v[i];
+            for (int l = 0; l < plan_.shading.lights; ++l) slabs.half[l][a].v[to] = all.half[l][a].v[i];
+        }
+        for (int piece = 0; piece < 1 << kSecondLookBits; ++piece)
+            copy_pieces(w_.looked[piece], i, 1, w_.cut, piece * kRays + to);
+    }
+    // Colours and opacities, as they are classified.
+    static void copy_pieces(const auto& from, int at, int count, auto& to, int there) {
+        std::copy_n(from.alpha.v + at, count, to.alpha.v + there);
+        for (int c = 0; c < 3; ++c) std::copy_n(from.color[c].v + at, count, to.color[c].v + there);
     }
 
     // for_pieces of gathered gradients.
