@@ -9,6 +9,7 @@
 #include "pipeline/stages/inside.h"
 
 #include "fixedpoint/unrolled-inl.h"
+#include "fixedpoint/words/range.h"
 #include "pipeline/classification/prefix-inl.h"
 #include "pipeline/stages/gradient-inl.h"
 
@@ -330,11 +331,17 @@ HWY_INLINE FadingNormals<W> fading_normals(const GradientStage& s,
             {s.fades ? confidence(s, gradient[0]) : zero, s.fades ? confidence(s, gradient[1]) : zero}};
 }
 
+/// What intervals alone follow.
+struct NotFollowed {};
+template <class W>
+using Followed = std::conditional_t<std::is_same_v<W, Range>, W, NotFollowed>;
+
 /// The light of a slab's pieces, front to back, joined to one colour.
 template <class W>
 struct PieceLight {
     std::array<W, 3> light;
-    W through;  // the transparency of the pieces so far
+    W through;                // the transparency of the pieces so far
+    Followed<W> brightest{};  // of any piece's colours
 };
 template <class W>
 HWY_INLINE PieceLight<W> no_piece(const InsideStage& s) {
@@ -348,6 +355,7 @@ HWY_INLINE void add_piece(const InsideStage& s, PieceLight<W>& sum, const std::a
     const W weight = s.premultiplied ? sum.through : part;
     for_three([&](std::size_t c) SQUINT_WRITTEN_OUT {
         sum.light[c] = affine(sum.light[c], weight, color[c], 0, s.most_light);
+        if constexpr (std::is_same_v<W, Range>) sum.brightest = max(sum.brightest, color[c]);
     });
     sum.through = within(sum.through - part, 0, s.one_alpha);
 }
@@ -368,6 +376,9 @@ HWY_INLINE std::array<W, 3> color_of_pieces(const InsideStage& s, const PieceLig
         color[c] =
             min(s.premultiplied ? quantise(sum.light[c], s.to_whole) : divide(sum.light[c], seen, s.to_whole),
                 limit);
+        // A mean of colours is no brighter than the brightest.
+        if constexpr (std::is_same_v<W, Range>)
+            if (!s.premultiplied) color[c] = min(color[c], sum.brightest);
     });
     return color;
 }

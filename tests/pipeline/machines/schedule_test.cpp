@@ -105,6 +105,15 @@ TEST(Schedule, FineStepsAskForNoWideLanesOfClassification) {
     }
 }
 
+// A joined colour is a mean of its pieces' colours, and no brighter than they are: intervals know.
+TEST(Schedule, SecondLooksKeepTheCompositingOfUnits) {
+    if (!has_vectors()) GTEST_SKIP();
+    const Schedule schedule = schedule_with({"shading.model=none", "classification.method=pips",
+                                             "transfer_function.points=[[0,1,1,1,0],[1000,1,1,1,1]]"});
+    EXPECT_THAT(schedule.name, HasSubstr("look_twice"));
+    EXPECT_THAT(schedule.name, HasSubstr("composite.unit15"));
+}
+
 TEST(Schedule, SaysWhichKernelItMissesAndWhy) {
     if (!has_vectors()) GTEST_SKIP();
     EXPECT_THAT(schedule_with({"shading.model=none"}, false).missed,
