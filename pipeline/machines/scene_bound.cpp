@@ -271,9 +271,16 @@ std::optional<std::string> what_has_no_scene_bound(const Plan& plan) {
                    : "hopeless for a lit scene without shading.gradient_floor: in almost every block a "
                      "gradient can vanish, "
                      "and its normal be any; allowed: shading.model none, or no lights (lights=[])";
-    if (!std::holds_alternative<PostClassification>(plan.method))
-        return fmt::format("classification.method {} has no scene bound yet; allowed: pc, pc_mid",
-                           name_of(plan.scene.classification.method));
+    const bool pips = std::holds_alternative<PowerSeriesOfOrder1>(plan.method);
+    if (!pips && !std::holds_alternative<PostClassification>(plan.method))
+        return fmt::format(
+            "classification.method {} has no scene bound yet; allowed: pc, pc_mid, and pips of order 1",
+            name_of(plan.scene.classification.method));
+    if (pips && plan.entries.any_opaque())
+        return "opaque entries have no scene bound with classification.method pips, whose slabs they cut; "
+               "allowed: pc, pc_mid";
+    if (plan.scene.classification.as_printed)
+        return "classification.as_printed has no scene bound; allowed: false";
     if (plan.interpolation.nearest)
         return "sampling.interpolation nearest jumps from voxel to voxel; allowed: trilinear";
     const CompositingForm form = plan.compositing.form;

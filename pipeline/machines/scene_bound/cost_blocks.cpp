@@ -29,6 +29,9 @@ CostBlocks::CostBlocks(const Plan& plan, const SampleErrors& errors, const SlabC
         // A ray leaves by any face of a clip box with axes of its own.
         const double step = plan.clip ? 1e30 : plan.step_world / volume_.spacing[axis] + off;
         inside_[a] = {low[axis] + step, high[axis] - step};
+        if (pips_of(plan))
+            within_a_step_[a] =
+                static_cast<std::int64_t>(std::ceil(plan.step_world / volume_.spacing[axis] + 2 * off));
     }
     const auto blocks = [&](int bits) {
         std::int64_t n = 1;
@@ -43,8 +46,9 @@ CostBlocks::CostBlocks(const Plan& plan, const SampleErrors& errors, const SlabC
     while (levels_.back().block.size() > 1) build_above();
 }
 
-CellValues CostBlocks::values(std::int64_t x, std::int64_t y, std::int64_t z) const {
+CellValues CostBlocks::of_cell(const Place& at) const {
     const Index3& d = volume_.dims;
+    const auto [x, y, z] = at;
     const std::array<std::int64_t, 2> xs{x, std::min(x + 1, d.x - 1)}, ys{y, std::min(y + 1, d.y - 1)},
         zs{z, std::min(z + 1, d.z - 1)};
     std::array<std::int64_t, 8> v{};
@@ -59,6 +63,68 @@ CellValues CostBlocks::values(std::int64_t x, std::int64_t y, std::int64_t z) co
         cell.edges += static_cast<double>(steepest);
     }
     return cell;
+}
+
+CellValues CostBlocks::values(std::int64_t x, std::int64_t y, std::int64_t z) const {
+    const Place at{x, y, z};
+    CellValues all = of_cell(at);
+    if (within_a_step_ == Place{}) return all;
+    Place low{}, high{};
+    for (std::size_t a = 0; a < 3; ++a) {
+        low[a] = std::max<std::int64_t>(at[a] - within_a_step_[a], 0);
+        high[a] = std::min(at[a] + within_a_step_[a],
+                           std::max<std::int64_t>(volume_.dims[static_cast<int>(a)] - 2, 0));
+    }
+    for (std::int64_t k = low[2]; k <= high[2]; ++k)
+        for (std::int64_t j = low[1]; j <= high[1]; ++j)
+            for (std::int64_t i = low[0]; i <= high[0]; ++i) all.take(of_cell({i, j, k}));
+    return all;
+}
+
+/// values() of all cells that are rendered with this z, x fastest: axis by axis.
+std::vector<CellValues> CostBlocks::plane(std::int64_t z) const {
+    Place first{}, last{};
+    for (std::size_t a = 0; a < 3; ++a) {
+        const std::int64_t most = std::max<std::int64_t>(volume_.dims[static_cast<int>(a)] - 2, 0);
+        first[a] = std::max<std::int64_t>((a < 2 ? cells_.first[a] : z) - within_a_step_[a], 0);
+        last[a] = std::min((a < 2 ? cells_.last[a] : z) + within_a_step_[a], most);
+    }
+    const std::int64_t wide = last[0] - first[0] + 1, deep = last[1] - first[1] + 1;
+    std::vector<CellValues> along_z;
+    along_z.reserve(static_cast<std::size_t>(wide * deep));
+    for (std::int64_t y = first[1]; y <= last[1]; ++y)
+        for (std::int64_t x = first[0]; x <= last[0]; ++x) {
+            CellValues all = of_cell({x, y, first[2]});
+            for (std::int64_t k = first[2] + 1; k <= last[2]; ++k) all.take(of_cell({x, y, k}));
+            along_z.push_back(all);
+        }
+    // Each rendered place of a line that begins at `begin`, with its neighbours.
+    const auto dilate = [&](std::size_t axis, const auto& line, std::int64_t begin, std::int64_t length,
+                            std::vector<CellValues>& to) {
+        for (std::int64_t at = cells_.first[axis]; at <= cells_.last[axis]; ++at) {
+            const std::int64_t low = std::max<std::int64_t>(at - within_a_step_[axis] - begin, 0),
+                               high = std::min(at + within_a_step_[axis] - begin, length - 1);
+            CellValues all = line(low);
+            for (std::int64_t i = low + 1; i <= high; ++i) all.take(line(i));
+            to.push_back(all);
+        }
+    };
+    std::vector<CellValues> along_x, all;
+    for (std::int64_t y = 0; y < deep; ++y)
+        dilate(
+            0, [&](std::int64_t i) { return along_z[static_cast<std::size_t>(y * wide + i)]; }, first[0],
+            wide, along_x);
+    const std::int64_t row = cells_.last[0] - cells_.first[0] + 1;
+    std::vector<CellValues> columns;
+    for (std::int64_t x = 0; x < row; ++x)
+        dilate(
+            1, [&](std::int64_t i) { return along_x[static_cast<std::size_t>(i * row + x)]; }, first[1], deep,
+            columns);
+    const std::int64_t column = cells_.last[1] - cells_.first[1] + 1;
+    for (std::int64_t y = 0; y < column; ++y)
+        for (std::int64_t x = 0; x < row; ++x)
+            all.push_back(columns[static_cast<std::size_t>(x * column + y)]);
+    return all;
 }
 
 bool CostBlocks::at_a_face(std::int64_t x, std::int64_t y, std::int64_t z) const {
@@ -79,7 +145,10 @@ void CostBlocks::build_lowest(const SlabCosts& costs) {
             return std::array{first,
                               std::min(first + (std::int64_t{1} << lowest_bits_) - 1, cells_.last[axis])};
         };
-        const auto [z0, z1] = cells_of(bz, 2);
+        const auto zs = cells_of(bz, 2);
+        const std::int64_t z0 = zs[0], z1 = zs[1], row = cells_.last[0] - cells_.first[0] + 1;
+        std::vector<std::vector<CellValues>> planes;
+        for (std::int64_t z = z0; z <= z1; ++z) planes.push_back(plane(z));
         for (std::int64_t by = 0; by < level.blocks[1]; ++by)
             for (std::int64_t bx = 0; bx < level.blocks[0]; ++bx) {
                 Found all;
@@ -87,7 +156,9 @@ void CostBlocks::build_lowest(const SlabCosts& costs) {
                 for (std::int64_t z = z0; z <= z1; ++z)
                     for (std::int64_t y = ys[0]; y <= ys[1]; ++y)
                         for (std::int64_t x = xs[0]; x <= xs[1]; ++x) {
-                            const CellValues cell = values(x, y, z);
+                            const CellValues& cell =
+                                planes[static_cast<std::size_t>(z - z0)][static_cast<std::size_t>(
+                                    (y - cells_.first[1]) * row + x - cells_.first[0])];
                             double& edges = steepest[static_cast<std::size_t>(bz)];
                             edges = std::max(edges, cell.edges);
                             Found here{costs.of(cell), costs.visible(cell)};

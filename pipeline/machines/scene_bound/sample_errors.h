@@ -4,12 +4,18 @@
 #include "fixedpoint/words/bounded.h"
 #include "pipeline/plan/plan.h"
 
+#include <algorithm>
+
 namespace squint {
 
 /// The values of a cell: its eight corners, and the sum over the axes of its steepest edges, in levels.
 struct CellValues {
     double low = 0, high = 0, edges = 0;
     bool flat() const { return low == high; }
+    void take(const CellValues& other) {
+        low = std::min(low, other.low), high = std::max(high, other.high),
+        edges = std::max(edges, other.edges);
+    }
 };
 
 struct SampleErrors {

@@ -38,6 +38,16 @@ Steepness steepness(const Function& f, double low, double high) {
     return most;
 }
 
+const EntryLookup& entries_of(const Plan& plan) {
+    const auto* pips = std::get_if<PowerSeriesOfOrder1>(&plan.method);
+    return pips ? pips->prefix.entries : std::get<PostClassification>(plan.method).entries;
+}
+/// What the lines and the end of the table of opacities are off by.
+double off_of_lines(const OpacityUnit& table) {
+    return std::ldexp(1.0, -2 * table.row_bits - 3) + std::ldexp(1.0, -table.alpha_fraction - 3) +
+           portable::exp(-std::ldexp(table.rows.rows() - 2, -table.row_bits));
+}
+
 /// How far two neighbouring words of a table's column are from the values that they stand for.
 struct RowErrors {
     double most = 0;
@@ -49,14 +59,20 @@ struct RowErrors {
 SlabCosts::SlabCosts(const Plan& plan, const SampleErrors& errors, double reach)
     : errors_(errors), reach_(reach) {
     const Function function(plan);
-    const EntryLookup& e = std::get<PostClassification>(plan.method).entries;
+    const EntryLookup& e = entries_of(plan);
     const int last = function.last();
     int bits = e.row_bits;
     while (bits < e.row_bits + 4 && last << (bits + 1) <= kMostBins) ++bits;
     per_entry_ = std::ldexp(1.0, bits);
     const int count = std::max(last << bits, 1);
-    for (int i = 0; i < count; ++i)
-        bin_.push_back(bin_at(plan, function, i / per_entry_, std::min((i + 1) / per_entry_, 1.0 * last)));
+    const PowerSeriesOfOrder1* pips = pips_of(plan);
+    if (pips)
+        steepest_row_ = std::ldexp(function.slope(Function::depth, 0, last), -pips->prefix.sub_entry_bits);
+    for (int i = 0; i < count; ++i) {
+        const double from = i / per_entry_, to = std::min((i + 1) / per_entry_, 1.0 * last);
+        bin_.push_back(bin_at(plan, function, from, to));
+        if (pips) add_ways(plan, *pips, function, from, to, bin_.back());
+    }
     for (int i = 0; i <= last; ++i) flat_.push_back(bin_at(plan, function, i, i));
     costing_.push_back(0), visible_.push_back(0);
     for (const InputBin& bin : bin_) {
@@ -81,7 +97,7 @@ SlabCosts::SlabCosts(const Plan& plan, const SampleErrors& errors, double reach)
 }
 
 InputBin SlabCosts::bin_at(const Plan& plan, const Function& f, double from, double to) const {
-    const EntryLookup& e = std::get<PostClassification>(plan.method).entries;
+    const EntryLookup& e = entries_of(plan);
     const bool point = from == to;
     const auto highest = static_cast<double>(f.last());
     const double low = std::max(from - reach_, 0.0), high = std::min(to + reach_, highest);
@@ -164,8 +180,7 @@ InputBin SlabCosts::bin_at(const Plan& plan, const Function& f, double from, dou
         last[index_of(Wire::slab_alpha)] =
             std::max(last[index_of(Wire::slab_alpha)],
                      unit_of(table.to_alpha) * std::ldexp(1.0, -table.alpha_fraction)) +
-            std::ldexp(1.0, -2 * table.row_bits - 3) + std::ldexp(1.0, -table.alpha_fraction - 3) +
-            portable::exp(-std::ldexp(table.rows.rows() - 2, -table.row_bits));
+            off_of_lines(table);
         last[index_of(Wire::length)] += rounding_of(1e-300, plan.location.length.rounding) *
                                         std::ldexp(1.0, -e.length_fraction) * deepest;
         bin.last_table = last.sum();
@@ -181,6 +196,93 @@ InputBin SlabCosts::bin_at(const Plan& plan, const Function& f, double from, dou
     }
     if (near.all) bin.opacity = f.opaque(from, to).all ? 1 : bin.opacity;
     return bin;
+}
+
+/// Parts of slabs between two inputs that lie in [from, to], beside slabs of one input there.
+void SlabCosts::add_ways(const Plan& plan, const PowerSeriesOfOrder1& pips, const Function& f, double from,
+                         double to, InputBin& bin) const {
+    const PrefixLookup& p = pips.prefix;
+    const EntryLookup& e = p.entries;
+    const auto highest = static_cast<double>(f.last());
+    const double low = std::max(from - reach_, 0.0), high = std::min(to + reach_, highest);
+    const Reach depths = f.over(Function::depth, from, to);
+    std::array<Reach, 3> colors;
+    double color_steep = 0, range = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+        colors[c] = f.over(c, 0, highest);
+        range = std::max(range, colors[c].high - colors[c].low);
+        color_steep = std::max(color_steep, f.slope(c, low, high));
+    }
+    const double steep = f.slope(Function::depth, low, high) * (1 + range) + depths.high * color_steep;
+
+    // Rates of the words' rows, an entry, beside what rises there: extinction is straight in a row.
+    const double rows = std::ldexp(1.0, p.sub_entry_bits),
+                 depth_unit = std::ldexp(rows, -e.extinction_fraction),
+                 light_unit = std::ldexp(rows, -plan.specs[Wire::table_moment].format.fraction_bits);
+    double off_depth = 0, off_rise = 0, off_light = 0, of_rows = 0, beyond = 0;
+    bool visible = bin.visible;
+    const auto first = static_cast<std::int64_t>(from * rows);
+    for (std::int64_t r = first; r + 1 < p.depth.rows() && (r == first || static_cast<double>(r) < to * rows);
+         ++r) {
+        const auto rise = [&](const Table& table, int column, double unit) {
+            return static_cast<double>(table.word(r + 1, column) - table.word(r, column)) * unit;
+        };
+        const double rate = rise(p.depth, 0, depth_unit),
+                     bend = p.curved ? static_cast<double>(p.depth.word(r, 1)) * depth_unit / 2 : 0;
+        visible = visible || rate > 0 || bend != 0;
+        const std::array<double, 2> place{static_cast<double>(r) / rows,
+                                          std::min(static_cast<double>(r + 1) / rows, highest)},
+            depth{f.at(Function::depth, place[0]), f.at(Function::depth, place[1])};
+        off_depth = std::max({off_depth, std::abs(rate - bend - depth[0]), std::abs(rate + bend - depth[1])});
+        off_rise = std::max(off_rise, std::abs(rate - (depth[0] + depth[1]) / 2));
+        beyond = std::max(beyond, std::abs(bend) - rate);
+        for (std::size_t c = 0; c < 3; ++c) {
+            const std::array<double, 2> color{f.at(c, place[0]), f.at(c, place[1])};
+            const double light = (color[0] * depth[0] + color[1] * depth[1]) / 3 +
+                                 (color[0] * depth[1] + color[1] * depth[0]) / 6;
+            off_light =
+                std::max(off_light, std::abs(rise(pips.moment, static_cast<int>(c), light_unit) - light));
+            of_rows = std::max(
+                of_rows, (std::max(depth[0], depth[1]) + steepest_row_ / 4) * std::abs(color[1] - color[0]));
+        }
+    }
+    // The colour divides by straight rises, of which an opacity may see twice where T bends.
+    const double twice = p.curved ? 2 : 1;
+
+    // An error of the opacity counts with a colour that may be any.
+    const double of_depth =
+                     rounding_of(1e-300, p.to_depth.rounding) * std::ldexp(1.0, -e.opacity.depth_fraction),
+                 of_alpha = unit_of(e.opacity.to_alpha) * std::ldexp(1.0, -e.opacity.alpha_fraction) +
+                            off_of_lines(e.opacity),
+                 off = off_depth + of_depth + of_alpha,
+                 seen = visible ? std::min(opacity_of(depths.high) + off, 1.0) : 0;
+    Shares table;
+    if (visible || depths.high > 0) {
+        const double of_words = std::min(off_depth, depth_unit);
+        table[index_of(Wire::table_extinction)] = 2 * of_words;
+        table[kRowsPay] = 2 * (off_depth - of_words);
+        if (visible) {
+            table[index_of(Wire::table_moment)] = twice * off_light;
+            table[index_of(Wire::table_extinction)] += twice * 2 * off_rise + beyond;
+            table[kRowsPay] += twice * of_rows;
+            table[index_of(Wire::slab_depth)] = 2 * of_depth;
+            table[index_of(Wire::slab_alpha)] = 2 * of_alpha;
+            table[index_of(Wire::slab_ratio)] =
+                seen * rounding_of(1e-300, pips.to_ratio.rounding) * std::ldexp(1.0, -e.color_fraction);
+        }
+    }
+    Shares last = table;
+    if (visible)
+        last[index_of(Wire::slab_depth)] +=
+            2 * rounding_of(1e-300, e.to_shorter.rounding) * std::ldexp(1.0, -e.opacity.depth_fraction);
+    last[index_of(Wire::length)] +=
+        std::ldexp(1.0, -e.length_fraction) * f.over(Function::depth, low, high).high;
+
+    bin.visible = visible;
+    bin.opacity = std::min(bin.opacity, visible ? std::max(opacity_of(depths.low) - off - 0x1p-40, 0.0) : 0);
+    bin.steep = std::max(bin.steep, steep), bin.last_steep = std::max(bin.last_steep, steep);
+    if (table.sum() > bin.table) bin.of_table = table, bin.table = table.sum();
+    if (last.sum() > bin.last_table) bin.of_last_table = last, bin.last_table = last.sum();
 }
 
 Costs SlabCosts::costs_of(const InputBin& bin, double error) {

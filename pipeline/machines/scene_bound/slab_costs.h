@@ -6,6 +6,25 @@
 //
 // where a_i is what the slab's own opacity and colour are off by.  h is convex in v: kept at a few v (kKnots),
 // it is at most straight between them.
+//
+// A slab of PIPS(1) is a mean along the straight way y from its front input to its back one: of extinction tau, and of
+// colour weighted by it.  Without opaque entries, and with e the most that either end is off by,
+//
+//     |alpha' - alpha| + alpha' |K' - K|  <=  mean of  |tau'(y)| e (1 + range of c) + tau |c'(y)| e + what rows take at y
+//     alpha'                              >=  mean of  alpha(tau(y)) - what rows take of it at y
+//
+// (X dK = int (c - K) dtau + int tau dc, alpha <= X; 1 - exp(-x) is concave).  Both are means over one way, so a_i -
+// alpha_i v is at most its greatest over all inputs on it: the same h, of all values that a cell and those a step away
+// hold.
+//
+// Rows.  T and X rise at known rates, exactly straight between rows (T's bend apart), so a short way is off by no more than a
+// long one: by the rates' own errors, and in colour by what rows cannot tell.  With Q_r, S_r a way's parts of depth in row
+// r by straight rises and by tau, k_r its colour there, c_r the row's,
+//
+//     K' - K = sum Q_r (c_r - k_r) / sum Q + sum (Q_r - S_r)(k_r - K) / sum Q.
+//
+// |c_r - k_r| is at most what c changes by in the row.  Q_r = S_r but in the two rows where the way ends, where they differ by
+// at most an eighth of a row times what tau changes by, and |k_r - K| is at most the mean of |c'| times the way.
 #pragma once
 
 #include "pipeline/machines/certificate/function.h"
@@ -14,9 +33,15 @@
 
 #include <array>
 #include <cstddef>
+#include <variant>
 #include <vector>
 
 namespace squint {
+
+/// PIPS(1) of the plan, where its slabs have two ends; a projection classifies points.
+inline const PowerSeriesOfOrder1* pips_of(const Plan& plan) {
+    return plan.projection_mode ? nullptr : std::get_if<PowerSeriesOfOrder1>(&plan.method);
+}
 
 inline constexpr std::array<double, 7> kKnots{0, 1.0 / 512, 1.0 / 128, 1.0 / 48, 1.0 / 16, 0.25, 1};
 
@@ -47,7 +72,7 @@ struct InputBin {
     bool costs() const { return steep > 0 || table > 0 || wall > 0 || last_table > 0 || last_wall > 0; }
 };
 
-/// Post-classification's costs.
+/// The costs of post-classification, whose slabs are one input, and of PIPS(1), whose slabs are a way between two.
 class SlabCosts {
   public:
     /// `reach`: the most that an input is off by, in entries.
@@ -77,11 +102,14 @@ class SlabCosts {
     Bins bins_of(const CellValues& cell, bool reached) const;
     const InputBin* flat_bin(const CellValues& cell) const;
     InputBin bin_at(const Plan& plan, const Function& function, double from, double to) const;
+    void add_ways(const Plan& plan, const PowerSeriesOfOrder1& pips, const Function& function, double from,
+                  double to, InputBin& bin) const;
     static Costs costs_of(const InputBin& bin, double error);
     Costs greatest_of(std::size_t error, const Bins& bins) const;
 
     SampleErrors errors_;
     double reach_ = 0, per_entry_ = 1;
+    double steepest_row_ = 0;             // the most that extinction changes in a row of T
     std::vector<InputBin> bin_, flat_;    // flat_: of whole entries, for cells that hold nothing else
     std::vector<int> costing_, visible_;  // how many bins before this one
     // The greatest costs of 2^l bins from each on, for each error: none, above none, then doubling up to reach_.
