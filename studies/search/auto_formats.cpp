@@ -67,7 +67,7 @@ class Choice {
         if (settings.progress)
             pictures.proven = [&settings, proofs = 0,
                                budget = scene.precision.budget](const Proof& proof) mutable {
-                settings.progress(fmt::format("formats: {} proofs; bound {:.4g} of {:g} LSB8", ++proofs,
+                settings.progress(fmt::format("formats, proof {}: bound {:.4g} of {:g} LSB8", ++proofs,
                                               proof.most, budget));
             };
     }
