@@ -257,17 +257,19 @@ TEST(SceneBound, OfWallsSaysThatItIsHopelessAndWhere) {
 // Each wire's rule, halved, is exceeded by a scene in which that wire alone is coarse and all others are wide: fields and
 // functions for which the bound by entries is nearly what a picture shows.
 struct SceneRule {
-    Wire wire;
+    int payer = 0;  // a wire, or one of the causes behind them
     bool pips = false;
     bool one_color =
         false;  // by an error of an input, a colour may change as an opacity does: either is seen alone
 };
 std::string name_of(const SceneRule& rule) {
-    return std::string(info(rule.wire).name) + (rule.pips ? "_of_pips" : "");
+    std::string name(payer_name(rule.payer));
+    std::replace(name.begin(), name.end(), ' ', '_');
+    return name + (rule.pips ? "_of_pips" : "");
 }
 class EverySceneRule : public ::testing::TestWithParam<SceneRule> {};
 TEST_P(EverySceneRule, HalvedIsExceededByASceneOfItsOwn) {
-    const Wire wire = GetParam().wire;
+    const int payer = GetParam().payer;
     double best = 0;
     for (unsigned seed = 1; seed <= 400 && best <= 0.5; ++seed) {
         try {
@@ -282,12 +284,16 @@ TEST_P(EverySceneRule, HalvedIsExceededByASceneOfItsOwn) {
             // One slab: what a wire may take is seen where nothing can undo it.
             d.scene.sampling.step = draw.one_of({1.0, 4.0, 40.0});
             Plan plan = make_plan(d.scene, d.volume);
-            if (std::find(plan.used_wires.begin(), plan.used_wires.end(), wire) == plan.used_wires.end())
-                continue;
-            d.scene.precision.override_[static_cast<std::size_t>(wire)] = draw_coarse(draw, plan.specs[wire]);
-            plan = make_plan(d.scene, d.volume);
+            if (payer < kWires) {
+                const auto wire = static_cast<Wire>(payer);
+                if (std::find(plan.used_wires.begin(), plan.used_wires.end(), wire) == plan.used_wires.end())
+                    continue;
+                d.scene.precision.override_[static_cast<std::size_t>(wire)] =
+                    draw_coarse(draw, plan.specs[wire]);
+                plan = make_plan(d.scene, d.volume);
+            }
             const SceneBound bound = bound_with(plan, 1, 400);
-            if (GetParam().pips && bound.payer != static_cast<int>(wire)) continue;
+            if (GetParam().pips && bound.payer != payer) continue;
             for (int view = 0; view < 3; ++view)
                 best = std::max(best, seen_in(d.scene, d.volume, draw).error / bound.most);
         } catch (const InputError&) {
@@ -303,12 +309,13 @@ std::vector<SceneRule> scene_rules() {
           Wire::weight, Wire::length, Wire::sample, Wire::classification_input, Wire::table_color,
           Wire::table_alpha, Wire::slab_ratio, Wire::slab_alpha, Wire::contribution, Wire::color,
           Wire::transparency})
-        all.push_back({wire});
+        all.push_back({static_cast<int>(wire)});
     for (const Wire wire : {Wire::slab_depth, Wire::table_extinction, Wire::table_moment, Wire::length,
                             Wire::slab_ratio, Wire::slab_alpha})
-        all.push_back({wire, true});
+        all.push_back({static_cast<int>(wire), true});
     for (const Wire wire : {Wire::weight, Wire::sample, Wire::classification_input})
-        all.push_back({wire, true, true});
+        all.push_back({static_cast<int>(wire), true, true});
+    all.push_back({kRowsPay, true});
     return all;
 }
 INSTANTIATE_TEST_SUITE_P(SceneBound, EverySceneRule, ::testing::ValuesIn(scene_rules()),
