@@ -147,7 +147,7 @@ class Search {
 Behind any_sequence(const Beams& beams, const CostBlocks::Found& found, std::int64_t samples) {
     Behind behind;
     behind.slabs = static_cast<double>(found.costs.last());
-    for (std::int64_t i = 0; i < samples && behind.sum() < 1; ++i) beams.step(behind, found, false);
+    for (std::int64_t i = 0; i < samples; ++i) beams.step(behind, found, false);
     return behind;
 }
 
@@ -309,7 +309,8 @@ SceneBound bound_scene(const Plan& plan, const SceneBoundOptions& options) {
         const CostBlocks blocks(plan, errors, costs);
         const Beams beams(plan, errors, blocks, compositing);
         const auto in_lsb8 = [&](const Behind& behind) {
-            const double sum = std::min(behind.sum() + termination, 1.0);
+            // Slabs come to 1 at most; the roundings of compositing may take a pixel beyond full scale.
+            const double sum = behind.sum() + termination;
             return 255 * (sum * (1 + 0x1p-20) + 0x1p-36);
         };
         CellValues whole{1.0 * plan.volume->smallest, 1.0 * plan.volume->largest, blocks.steepest()};

@@ -168,6 +168,17 @@ TEST(SceneBound, OfSlabsBetweenTwoInputsIsExceededByNoViewOfScenesDrawnAtRandom)
     check_scenes(true);
 }
 
+TEST(SceneBound, PassesFullScaleWhereRoundingsOfCompositingDo) {
+    constexpr unsigned kSeed = 6084;  // opacity that is kept as 1 - T, in one fraction bit
+    const Drawn d = draw_scene(kSeed, true);
+    const SceneBound bound = bound_with(make_plan(d.scene, d.volume), 1, 3000);
+    Draw draw(kSeed + 100000);
+    double most = 0;
+    for (int view = 0; view < 4; ++view) most = std::max(most, seen_in(d.scene, d.volume, draw).error);
+    EXPECT_GT(most, 255.5) << "or the case is none any more";
+    EXPECT_LE(most, bound.most);
+}
+
 class HardSceneBound : public ::testing::TestWithParam<const char*> {};
 TEST_P(HardSceneBound, IsExceededByNoViewOfTheHardCases) {
     const std::string method = GetParam();
