@@ -49,7 +49,7 @@ class RunLog {
     struct Counts {
         std::size_t computed = 0, reused = 0, failed = 0;
     };
-    RunLog(std::string folder, Json about);
+    RunLog(const std::string& folder, const Json& about);
     void write(const char* state, double seconds, const Counts& counts);
 
   private:
