@@ -311,6 +311,7 @@ class LightOfCells {
         const LightReach table = full({low, high}, {low, high}, 1, 1);
         LightReach all = with_rest(table, low, high, alpha);
         all.take(with_rest(with_opacity(table, alpha), low, high, alpha));
+        if (!(alpha.low > 0)) all.take(LightReach::at(0, 0));  // a transparent slab is not lit
         return all;
     }
     LightReach opaque(const Reach&) const { return LightReach::any(); }
@@ -347,14 +348,17 @@ class LightOfCells {
 FadingLight<Bounded> fading_light(const BoundedCells& m, const Bounded& front, const Bounded& back,
                                   const Bounded& length, const Slab<Bounded>& whole) {
     const PrefixLookup& prefix = m.words.prefix;
-    const FadingLight<Int128> word = HWY_NAMESPACE::fading_light(
+    FadingLight<Int128> word = HWY_NAMESPACE::fading_light(
         m.words, front.v, back.v, length.v,
         Slab<Int128>{{whole.color[0].v, whole.color[1].v, whole.color[2].v}, whole.alpha.v});
     const SlabEnds s(prefix.entries, m.function, front, back, length);
     const ExactEnds ends(m.real.prefix.entries, s);
-    const FadingLight<Real<double>> there =
-        HWY_NAMESPACE::fading_light(m.real, ends.front, ends.back, ends.length,
-                                    HWY_NAMESPACE::classify(m.real, ends.front, ends.back, ends.length));
+    const Slab<Real<double>> exact = HWY_NAMESPACE::classify(m.real, ends.front, ends.back, ends.length);
+    FadingLight<Real<double>> there =
+        HWY_NAMESPACE::fading_light(m.real, ends.front, ends.back, ends.length, exact);
+    // A transparent slab is not lit, whatever its tables hold between nodes.
+    if (whole.alpha.v == 0) word.part = {};
+    if (!(exact.alpha.v > 0)) there.part = {};
     const double unit = 1 / static_cast<double>(m.words.premultiplied.one_color),
                  exact_unit = 1 / static_cast<double>(m.real.premultiplied.one_color);
     const auto count = static_cast<std::size_t>(word.count);

@@ -208,6 +208,15 @@ TEST(LitCertificate, OfLightThatFadesByTablesIsExceededByNoPixelOfPicturesDrawnA
                 {std::string("classification.method=") + method, std::string("shading.inside=") + rule});
 }
 
+// A point that its row makes transparent, between nodes that are not: words do not light it.
+TEST(LitCertificate, KnowsThatATransparentSlabIsNotLitByItsTables) {
+    const Case c = draw_case(2082, true);
+    const Scene scene = scene_with(c.scene, {"classification.method=pi2d", "shading.inside=linear"});
+    const Compared all = compared(make_plan(scene, c.plan.volume));
+    EXPECT_EQ(all.over, "");
+    EXPECT_GT(all.error, 5) << "or the case is none any more";
+}
+
 // Where a wall may be missed, and nothing dims a slab's colours: brighter than any entry.
 TEST(Certificate, KnowsThatColoursWhichNothingDimsPassTheCurves) {
     const Case c = draw_case(3261);
