@@ -115,7 +115,7 @@ void time_frame(benchmark::State& state, const Frame& frame) try {
             scene.transfer_function.unit_distance *= 1.001;
             plan.emplace(make_plan(scene, volume));
         }
-        last = render(*plan, frame.options);
+        render(*plan, frame.options, last);
         const double all = watch.ms() / 1000;
         state.SetIterationTime(frame.picture == Picture::same ? last.statistics.seconds : all);
         seconds += last.statistics.seconds, samples += static_cast<double>(last.statistics.samples),

@@ -48,7 +48,7 @@ void time_point(benchmark::State& state, const Point& point) {
     double seconds = 0, samples = 0, visited = 0;
     for (auto step : state) {
         (void)step;
-        last = render(plan, options);
+        render(plan, options, last);
         state.SetIterationTime(last.statistics.seconds);
         seconds += last.statistics.seconds, samples += static_cast<double>(last.statistics.samples);
         visited += static_cast<double>(last.statistics.visited);

@@ -193,8 +193,9 @@ void write_reference(const Job& job, const Plan& plan, const Image& reference, i
               attributes);
 }
 
-/// Renders, writes and reports one picture; returns its record.
-Json render_frame(const Job& job, int frame) {
+/// Renders, writes and reports one picture; returns its record.  `rendering`: of the frame before, whose memory
+/// this one takes.
+Json render_frame(const Job& job, int frame, Rendering& rendering) {
     const RenderArguments& a = job.arguments;
     const Plan plan = plan_asked_for(job.scene, job.volume, frame);
     if (a.bound)
@@ -209,13 +210,12 @@ Json render_frame(const Job& job, int frame) {
     options.audit = a.options.audit || !a.profile.empty();
     if (a.max_memory > 0) options.layout_bytes = a.max_memory - needed;
     options.progress = [&](double part) { (*bar)(part); };
-    Rendering rendering;
     Errors errors;
     Certificate certificate;
     std::string page;
     {
         const Interruptible here;
-        rendering = render(plan, options);
+        render(plan, options, rendering);
         options.progress = nullptr;
         bar.reset();
         if (a.error) {
@@ -249,9 +249,12 @@ Json render_frame(const Job& job, int frame) {
     const std::string exr = frame_path(job.output, frame, frames),
                       png = frame_path(job.preview, frame, frames);
     if (!exr.empty()) {
-        Image whole = rendering.image;
-        for (const Channel& channel : certificate.image.channels) whole.channels.push_back(channel);
-        write_exr(whole, exr, exr_attributes(plan, frame));
+        // The bounds' channels stand beside the picture's while they are written.
+        std::vector<Channel>& channels = rendering.image.channels;
+        const auto own = static_cast<std::ptrdiff_t>(channels.size());
+        for (Channel& channel : certificate.image.channels) channels.push_back(std::move(channel));
+        write_exr(rendering.image, exr, exr_attributes(plan, frame));
+        channels.erase(channels.begin() + own, channels.end());
     }
     if (!png.empty()) {
         const Vec3& b = job.scene.image.background;
@@ -340,7 +343,9 @@ int run(const RenderArguments& a) {
         for (const std::string& note : notes) say(fmt::format("  note: {}\n", message_text(note)));
 
     Json pictures = Json::array();
-    for (int frame = 0; frame < scene.camera.turntable; ++frame) pictures.push_back(render_frame(job, frame));
+    Rendering rendering;
+    for (int frame = 0; frame < scene.camera.turntable; ++frame)
+        pictures.push_back(render_frame(job, frame, rendering));
     if (scene.camera.turntable > 1 && !a.quiet && !(output.empty() && preview.empty())) say(film_line(job));
     if (a.json.empty()) return kDone;
     Json record{{"schema", "squint.render/2"},

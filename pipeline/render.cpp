@@ -14,6 +14,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <initializer_list>
+#include <vector>
 
 namespace squint {
 namespace {
@@ -30,25 +32,71 @@ std::vector<Tile> tiles_of(int width, int height, int size) {
     return tiles;
 }
 
-void add_channels(const Scene& scene, Image& image) {
-    for (const char* name : {"R", "G", "B", "A"}) image.add_float(name);
-    if (scene.output.depth) image.add_float("Z"), image.add_float("Z.mean");
-    if (scene.output.normals) image.add_float("N.x"), image.add_float("N.y"), image.add_float("N.z");
-    if (scene.output.samples) image.add_float("samples");
-    if (scene.output.transparency) image.add_float("T");
-    if (scene.output.fixed)
-        for (const char* name : {"fixed.R", "fixed.G", "fixed.B", "fixed.T"}) image.add_words(name);
+struct ChannelKind {
+    const char* name;
+    bool is_words;
+};
+
+std::vector<ChannelKind> channels_of(const OutputSettings& output) {
+    std::vector<ChannelKind> kinds;
+    const auto add = [&](bool wanted, std::initializer_list<const char*> names, bool is_words = false) {
+        for (const char* name : names)
+            if (wanted) kinds.push_back({name, is_words});
+    };
+    add(true, {"R", "G", "B", "A"});
+    add(output.depth, {"Z", "Z.mean"});
+    add(output.normals, {"N.x", "N.y", "N.z"});
+    add(output.samples, {"samples"});
+    add(output.transparency, {"T"});
+    add(output.fixed, {"fixed.R", "fixed.G", "fixed.B", "fixed.T"}, true);
+    return kinds;
+}
+
+bool is_such(const Image& image, int width, int height, const std::vector<ChannelKind>& kinds) {
+    const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+    const auto same = [&](const Channel& channel, const ChannelKind& kind) {
+        return channel.name == kind.name && channel.values.size() == (kind.is_words ? 0 : pixels) &&
+               channel.words.size() == (kind.is_words ? pixels : 0);
+    };
+    return image.width == width && image.height == height &&
+           std::equal(image.channels.begin(), image.channels.end(), kinds.begin(), kinds.end(), same);
+}
+
+Image blank(int width, int height, const std::vector<ChannelKind>& kinds) {
+    Image image;
+    image.width = width, image.height = height;
+    for (const ChannelKind& kind : kinds)
+        kind.is_words ? image.add_words(kind.name) : image.add_float(kind.name);
+    return image;
+}
+
+void clear(const Tile& tile, Image& image) {
+    const auto zero = [&](auto& pixels) {
+        for (int y = tile.top; y < tile.bottom && !pixels.empty(); ++y) {
+            const auto row = pixels.begin() + std::ptrdiff_t{y} * image.width;
+            std::fill(row + tile.left, row + tile.right, 0);
+        }
+    };
+    for (Channel& channel : image.channels) zero(channel.values), zero(channel.words);
 }
 
 }  // namespace
 
 Rendering render(const Plan& plan, const RenderOptions& options) {
     Rendering result;
-    Image& image = result.image;
-    image.width = plan.camera.width, image.height = plan.camera.height;
-    add_channels(plan.scene, image);
+    render(plan, options, result);
+    return result;
+}
 
-    RenderStatistics& statistics = result.statistics;
+void render(const Plan& plan, const RenderOptions& options, Rendering& into) {
+    Image& image = into.image;
+    const std::vector<ChannelKind> kinds = channels_of(plan.scene.output);
+    const bool is_used = is_such(image, plan.camera.width, plan.camera.height, kinds);
+    if (!is_used) image = {}, image = blank(plan.camera.width, plan.camera.height, kinds);
+    image.left = image.top = 0, image.is_display = false;
+
+    RenderStatistics& statistics = into.statistics;
+    statistics = {};
     statistics.threads = threads_for(options.threads);
     const std::vector<Tile> tiles = tiles_of(image.width, image.height, std::max(1, options.tile));
     std::vector<TileStatistics> per_tile(tiles.size());
@@ -80,6 +128,7 @@ Rendering render(const Plan& plan, const RenderOptions& options) {
                     if (options.cancelled && *options.cancelled) stopped = true;
                     if (stopped) return;
                     const Tile& t = tiles[i];
+                    if (is_used) clear(t, image);
                     if (fast)
                         fast->render_tile(t.left, t.top, t.right, t.bottom, image, per_tile[i]);
                     else
@@ -100,7 +149,6 @@ Rendering render(const Plan& plan, const RenderOptions& options) {
         if (t.wires)
             for (std::size_t w = 0; w < t.wires->size(); ++w) statistics.wires[w].merge((*t.wires)[w]);
     }
-    return result;
 }
 
 }  // namespace squint

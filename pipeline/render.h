@@ -52,5 +52,8 @@ struct Rendering {
 /// Renders R G B A and the channels that the scene asks for.  Threads, tiles, path, target and layout do not
 /// change a bit.
 Rendering render(const Plan& plan, const RenderOptions& options = {});
+/// The same into a rendering of before, whose image keeps its memory where size and channels are the same: a frame of
+/// an animation waits for no new pages.  All that it held is replaced.
+void render(const Plan& plan, const RenderOptions& options, Rendering& into);
 
 }  // namespace squint

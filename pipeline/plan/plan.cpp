@@ -2,6 +2,7 @@
 
 #include "pipeline/plan/demands.h"
 #include "pipeline/plan/findings.h"
+#include "pipeline/plan/kept_method.h"
 #include "pipeline/plan/ranges.h"
 #include "pipeline/plan/short_slabs.h"
 #include "pipeline/stages/inputs.h"
@@ -122,7 +123,9 @@ void report_approximations(Plan& plan) {
 }
 
 void plan_classification(Plan& plan) {
-    plan.method = build_method(classification_inputs(plan));
+    const ClassificationInputs inputs = classification_inputs(plan);
+    // Plans without rounding add exact values to their tables: those are their own.
+    plan.method = plan.real ? build_method(inputs) : kept_method(*plan.volume, inputs);
     plan.needs_back =
         !plan.projection_mode && std::visit([](const auto& m) { return m.kNeedsBack; }, plan.method);
     if (plan.needs_back && plan.scene.sampling.interpolation == InterpolationRule::nearest)

@@ -1,6 +1,6 @@
 #include "pipeline/machines/lanes/cell_blocks.h"
 
-#include "pipeline/machines/lanes/kept.h"
+#include "pipeline/kept.h"
 #include "pipeline/stages/faces.h"
 
 #include <sys/mman.h>

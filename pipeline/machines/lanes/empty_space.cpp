@@ -1,6 +1,6 @@
 #include "pipeline/machines/lanes/empty_space.h"
 
-#include "pipeline/machines/lanes/kept.h"
+#include "pipeline/kept.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>

@@ -1,6 +1,6 @@
 #include "pipeline/machines/lanes/kept_empty_space.h"
 
-#include "pipeline/machines/lanes/kept.h"
+#include "pipeline/kept.h"
 
 #include <algorithm>
 

@@ -1,7 +1,7 @@
 #include "pipeline/machines/lanes/lane_renderer.h"
 
+#include "pipeline/kept.h"
 #include "pipeline/machines/lanes/blocks_met.h"
-#include "pipeline/machines/lanes/kept.h"
 #include "pipeline/machines/lanes/packet_loop.h"
 #include "pipeline/machines/lanes/targets.h"
 
@@ -138,6 +138,27 @@ void build_cells(const std::shared_ptr<CellBlocks>& cells, const Volume& volume,
         });
 }
 
+// Whether rays may meet something that cannot be seen.
+bool hides_something(const EmptySpace& space) {
+    const auto blocks = static_cast<std::int64_t>(space.distance.size());
+    std::int64_t halves = 0;
+    for (const std::uint32_t word : space.fine) halves += std::popcount(word);
+    return space.visible_blocks < blocks || (!space.fine.empty() && halves < 8 * blocks);
+}
+
+// Found anew where the last call for this volume was about other empty space.
+std::shared_ptr<const AboutEmptySpace> about(const Volume& volume,
+                                             const std::shared_ptr<const EmptySpace>& empty) {
+    static KeptPerVolume<const AboutEmptySpace> kept;
+    return kept.find_or_make(
+        volume,
+        [&] {
+            return std::make_shared<const AboutEmptySpace>(
+                AboutEmptySpace{empty, VisibleSurface(*empty), hides_something(*empty)});
+        },
+        [&](const AboutEmptySpace& found) { return found.empty.lock() == empty; });
+}
+
 }  // namespace
 
 StageWays ways_of(const Plan& plan) {
@@ -184,11 +205,10 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
     for (std::size_t i = 0; i < plan.stages.size(); ++i) {
         const StageReport& stage = plan.stages[i];
         const bool once_a_ray = plan.projection_mode && i >= 2;  // in the model's words
-        if (const auto obstacle = too_wide(stage.name, stage.needs);
-            stage.modelled && !once_a_ray && obstacle)
+        if (auto obstacle = too_wide(stage.name, stage.needs); stage.modelled && !once_a_ray && obstacle)
             return obstacle;
     }
-    if (const auto obstacle = too_wide("classification input", plan.input_needs)) return obstacle;
+    if (auto obstacle = too_wide("classification input", plan.input_needs)) return obstacle;
     if (plan.gradient.exaggerated.wanted && plan.word_bits > 64)
         return "exaggerated normals are turned in 64 bits";
     if (plan.lit && plan.specs[Wire::normal].overflow == Overflow::wrap)
@@ -216,10 +236,10 @@ std::optional<std::string> what_needs_the_model(const Plan& plan) {
                            bits);
     };
     for (const Wire wire : stored)
-        if (const auto obstacle = most_bits(wire, 31)) return obstacle;
+        if (auto obstacle = most_bits(wire, 31)) return obstacle;
     if (plan.lit)  // the sum of a slab's two ends has one more bit
-        if (const auto obstacle = most_bits(
-                Wire::gradient, plan.shares_ends() && !lights_between_ends(plan.inside.rule) ? 30 : 31))
+        if (auto obstacle = most_bits(Wire::gradient,
+                                      plan.shares_ends() && !lights_between_ends(plan.inside.rule) ? 30 : 31))
             return obstacle;
     return std::nullopt;
 }
@@ -238,27 +258,20 @@ LaneRenderer::LaneRenderer(const Plan& plan, const RenderOptions& options)
     choose_layout(options);
     kernels_ = kernels_for(plan, ways_, voxels_, target_);
     schedule_ = schedule_of(plan, kernels_);
-    if (empty_ && !plan.projection_mode && nothing_is_black(plan)) seen_ = visible_packets(plan, *empty_);
+    if (empty_ && !plan.projection_mode && nothing_is_black(plan))
+        seen_ = visible_packets(plan, about_->surface);
 }
-
-namespace {
-// Whether rays may meet something that cannot be seen.
-bool hides_something(const EmptySpace& space) {
-    const auto blocks = static_cast<std::int64_t>(space.distance.size());
-    std::int64_t halves = 0;
-    for (const std::uint32_t word : space.fine) halves += std::popcount(word);
-    return space.visible_blocks < blocks || (!space.fine.empty() && halves < 8 * blocks);
-}
-}  // namespace
 
 void LaneRenderer::find_empty() {
     const std::int64_t needs = EmptySpace::bytes_for(blocks_met(plan_));
     empty_ = empty_space_of(plan_, room_);
-    if (empty_ && hides_something(*empty_)) asked_ = empty_.get();
-    if (empty_)
-        room_ -= EmptySpace::bytes_for(empty_->box);
-    else
+    if (empty_) {
+        about_ = about(*plan_.volume, empty_);
+        if (about_->hides_something) asked_ = empty_.get();
+        room_ -= EmptySpace::bytes_for(empty_->box) + about_->surface.bytes();
+    } else {
         no_room_to_skip_ = may_skip(plan_) && needs > room_;
+    }
 }
 
 void LaneRenderer::choose_layout(const RenderOptions& options) {
@@ -326,7 +339,7 @@ std::string LaneRenderer::why() const {
 }
 
 std::int64_t LaneRenderer::bytes() const {
-    return (empty_ ? EmptySpace::bytes_for(empty_->box) : 0) +
+    return (empty_ ? EmptySpace::bytes_for(empty_->box) + about_->surface.bytes() : 0) +
            (walls_ ? NearWalls::bytes_for(walls_->box) : 0) + (cells_ ? cells_->bytes() : 0);
 }
 

@@ -23,6 +23,13 @@ std::optional<std::string> what_needs_the_model(const Plan& plan);
 /// runs it.  In one line; of the best target, with cells where they pay and memory has room for them.
 std::string words_in_lanes(const Plan& plan);
 
+/// What follows from empty space before any camera is known.
+struct AboutEmptySpace {
+    std::weak_ptr<const EmptySpace> empty;
+    VisibleSurface surface;
+    bool hides_something;  // rays may meet what cannot be seen
+};
+
 class LaneRenderer {
   public:
     /// Throws InputError for a target that this machine lacks.
@@ -49,7 +56,8 @@ class LaneRenderer {
     StageKernels kernels_;
     Schedule schedule_;
     std::shared_ptr<const EmptySpace> empty_;
-    const EmptySpace* asked_ = nullptr;  // by rays; null where all can be seen
+    std::shared_ptr<const AboutEmptySpace> about_;  // with empty_
+    const EmptySpace* asked_ = nullptr;             // by rays; null where all can be seen
     std::shared_ptr<const NearWalls> walls_;
     ScreenMask seen_;
     CountSlabs count_slabs_;

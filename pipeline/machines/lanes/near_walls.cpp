@@ -1,6 +1,6 @@
 #include "pipeline/machines/lanes/near_walls.h"
 
-#include "pipeline/machines/lanes/kept.h"
+#include "pipeline/kept.h"
 #include "pipeline/stages/faces.h"
 
 #include <tbb/parallel_for.h>

@@ -40,9 +40,24 @@ class ScreenMask {
     std::vector<std::uint8_t> marks_;
 };
 
-/// The packets of a plan's picture whose rays run through a visible block, and some around them.  Every block
-/// on the surface of the visible ones marks its rectangle on the screen: a ray that meets an inner block
-/// meets one of those when it leaves.
-ScreenMask visible_packets(const Plan& plan, const EmptySpace& empty);
+/// The visible blocks with a neighbour that cannot be seen or lies beyond the box.  They depend on no camera: found
+/// once a transfer function.
+struct VisibleSurface {
+    struct Block {
+        std::uint32_t x;  // from the box's corner on, as y
+        std::uint32_t y : 26,
+            open : 6;  // bit 2 a: the neighbour before it along axis a is such a one; 2 a + 1: behind
+    };
+    BlockBox box;
+    std::vector<std::vector<Block>> layers;  // along z
+
+    explicit VisibleSurface(const EmptySpace& empty);
+    std::int64_t bytes() const;
+};
+
+/// The packets of a plan's picture whose rays run through a visible block, and some around them.  Blocks of the
+/// surface mark their rectangle on the screen, those alone that a ray may enter from where nothing can be seen:
+/// behind them it meets others of which it passed one.
+ScreenMask visible_packets(const Plan& plan, const VisibleSurface& surface);
 
 }  // namespace squint::lanes

@@ -82,7 +82,7 @@ TEST(ScreenMask, HoldsWhatIsSeenAndLittleElse) {
         if (plan.needs_back) continue;  // their visible blocks reach farther
         const auto space = lanes::find_empty_space(
             *lanes::block_ranges(*plan.volume, lanes::all_blocks_of(*plan.volume)), plan.entries, 0);
-        const lanes::ScreenMask mask = lanes::visible_packets(plan, space);
+        const lanes::ScreenMask mask = lanes::visible_packets(plan, lanes::VisibleSurface(space));
         RenderOptions options;
         options.path = Path::model;
         const Image image = render(plan, options).image;

@@ -9,7 +9,7 @@
 #include <memory>
 #include <mutex>
 
-namespace squint::lanes {
+namespace squint {
 
 template <class T>
 class KeptPerVolume {
@@ -56,4 +56,4 @@ class KeptPerVolume {
     std::map<const void*, Kept> kept_;
 };
 
-}  // namespace squint::lanes
+}  // namespace squint
