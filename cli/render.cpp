@@ -40,8 +40,8 @@ struct RenderArguments {
     std::string profile, command;       // the page of --profile, and what asked for it
     RenderOptions options;
     std::int64_t max_memory = 0;  // bytes; 0: no limit
-    bool reference = false, error = false, bound = false, quiet = false, scene_reference = false,
-         print_scene = false;
+    bool reference = false, error = false, exact = false, bound = false, quiet = false,
+         scene_reference = false, print_scene = false;
 };
 
 using Json = nlohmann::ordered_json;
@@ -129,28 +129,39 @@ std::string text_of_error(const Comparison& comparison) {
     return fmt::format("{:.1f} dB, largest error {:.2f} of 255", d.psnr.value_or(0), 255 * d.largest);
 }
 
+/// " of one pixel in 16"; nothing of every pixel.
+std::string one_pixel_in(int every) {
+    return every == 1 ? "" : fmt::format(" of one pixel in {}", every * every);
+}
+
 std::string error_text(const Errors& errors) {
     std::string text;
     if (errors.against_real)
-        text += fmt::format("  rounding, against double: {} (foreground, linear light)\n",
+        text += fmt::format("  rounding, against {}: {} (foreground, linear light)\n",
+                            errors.by_floats ? "floats, which err less than a tenth of it" : "double",
                             text_of_error(*errors.against_real));
     for (const StageError& stage : errors.stages)
-        text += fmt::format("    {:<16} alone: {}\n", stage.stage, text_of_error(stage.against_real));
+        text += fmt::format("    {:<16} alone{}: {}\n", stage.stage, one_pixel_in(errors.every),
+                            text_of_error(stage.against_real));
     if (errors.against_reference)
         text += fmt::format("  everything, against the reference: {}\n",
                             text_of_error(*errors.against_reference));
     return text;
 }
 
-/// The cost of --error: a picture in double, and one for each stage that rounds.
-std::string price_of_errors(const Plan& plan, const RenderStatistics& statistics) {
+/// The cost of --error: a picture in double, and one for each stage that rounds, or some pixels of them.
+std::string price_of_errors(const Plan& plan, const RenderStatistics& statistics, ErrorRays rays) {
     std::ptrdiff_t stages = 0;
     if (!plan.real)
         stages = std::count_if(plan.stages.begin(), plan.stages.end(),
                                [](const StageReport& s) { return s.modelled; });
-    const double slower = statistics.path == "lanes" ? 10 : 1;  // doubles run in the model; measured
-    return fmt::format("  measuring the error: {} more pictures, about {}\n", stages + 1,
-                       text_of_time(static_cast<double>(stages + 1) * statistics.seconds * slower));
+    const bool is_fast = statistics.path == "lanes";
+    const double slower = is_fast ? 40 : 1;  // doubles run in the model; measured
+    const int every = rays == ErrorRays::all ? 1 : error_lattice(plan);
+    const double pictures = static_cast<double>(stages + 1), of_floats = every > 1 ? 2 : 0;
+    return fmt::format("  measuring the error: {} more pictures{}, about {}\n", stages + 1,
+                       one_pixel_in(every),
+                       text_of_time(statistics.seconds * (pictures * slower / (every * every) + of_floats)));
 }
 
 std::string bound_text(const Certificate& c) {
@@ -218,9 +229,10 @@ Json render_frame(const Job& job, int frame, Rendering& rendering) {
         render(plan, options, rendering);
         options.progress = nullptr;
         bar.reset();
-        if (a.error) {
-            if (!a.quiet) say(price_of_errors(plan, rendering.statistics));
-            errors = rounding_errors(plan, rendering.image, options, frame);
+        if (a.error || a.exact) {
+            const ErrorRays rays = a.exact ? ErrorRays::all : ErrorRays::enough;
+            if (!a.quiet) say(price_of_errors(plan, rendering.statistics, rays));
+            errors = rounding_errors(plan, rendering.image, options, frame, rays);
         }
         const auto obstacle = a.profile.empty() ? std::nullopt : what_is_not_bounded(plan);
         if (a.bound || (!a.profile.empty() && !obstacle)) {
@@ -262,7 +274,7 @@ Json render_frame(const Job& job, int frame, Rendering& rendering) {
         write_preview(rendering.image, png, background);
     }
     if (!page.empty()) write_text_whole(frame_path(a.profile, frame, frames), page);
-    const bool measured = a.error || a.reference;
+    const bool measured = a.error || a.exact || a.reference;
     std::vector<std::string> warnings = warnings_of(plan, rendering);
     warnings.insert(warnings.begin(), job.warnings.begin(), job.warnings.end());
     if (!a.quiet) {
@@ -378,8 +390,11 @@ void flags(Flags& f, RenderArguments& a) {
           "Write a record of the picture (schema squint.render/2): time, samples, path, memory, hash")
         .value("FILE|-");
     f.add("--error", a.error,
-          "Measure the error against the same scene in double, and each stage's share: up to eight "
-          "more pictures");
+          "Measure the error against the same scene in double, and each stage's share; of pictures of more "
+          "than "
+          "16,000 pixels the shares by some of these, and all by floats where their error does not show");
+    f.add("--error-exact", a.exact,
+          "As --error, every pixel in double: up to eight more pictures, and slow ones");
     f.add("--bound", a.bound,
           "Prove how far any pixel can be from the same scene without rounding, who pays for it, and which "
           "rays "

@@ -44,6 +44,8 @@ struct Errors {
     std::optional<Comparison> against_real;       // of rounding alone
     std::optional<Comparison> against_reference;  // of everything
     std::vector<StageError> stages;               // those that are modelled
+    bool by_floats = false;                       // against_real: floats drew the picture without rounding
+    int every = 1;                                // stages: every so many-th pixel of every so many-th row
 };
 
 /// The plan of the same scene with precision.preset = real: nothing is rounded, and no wire has its own Spec.
@@ -52,9 +54,17 @@ Plan real_plan(const Plan& plan, int frame = 0);
 /// The wires of one stage; of all stages for "".
 std::array<bool, kWires> wires_of(std::string_view stage);
 
-/// Renders `plan` in double, then with the wires of each modelled stage alone rounded, and compares R, G, B
-/// and A.  `options` are those of the picture; audit is ignored.
-Errors rounding_errors(const Plan& plan, const Image& picture, const RenderOptions& options, int frame = 0);
+/// Every so many-th row and column stand for a picture when its stages' errors are measured: all of a small one.
+int error_lattice(const Plan& plan);
+
+enum class ErrorRays { enough, all };
+
+/// Renders `plan` without rounding, then with the wires of each modelled stage alone rounded, and compares R, G, B
+/// and A.  `all`: every pixel in double.  `enough`: the stages on error_lattice(), and the whole picture by lanes of
+/// floats where these, on the lattice, err by less than a tenth (20 dB) of what is measured.  `options` are those of
+/// the picture; audit is ignored.
+Errors rounding_errors(const Plan& plan, const Image& picture, const RenderOptions& options, int frame = 0,
+                       ErrorRays rays = ErrorRays::enough);
 
 /// Compares R, G, B and A of two pictures of one scene.
 Comparison compare_colors(const Image& picture, const Image& other);

@@ -70,6 +70,10 @@ Image blank(int width, int height, const std::vector<ChannelKind>& kinds) {
     return image;
 }
 
+int thinned_size(int size, int every) {
+    return (size - every / 2 + every - 1) / every;
+}
+
 void clear(const Tile& tile, Image& image) {
     const auto zero = [&](auto& pixels) {
         for (int y = tile.top; y < tile.bottom && !pixels.empty(); ++y) {
@@ -149,6 +153,41 @@ void render(const Plan& plan, const RenderOptions& options, Rendering& into) {
         if (t.wires)
             for (std::size_t w = 0; w < t.wires->size(); ++w) statistics.wires[w].merge((*t.wires)[w]);
     }
+}
+
+Image render_thinned(const Plan& plan, const RenderOptions& options, int every) {
+    if (every == 1) return render(plan, options).image;
+    Image image = blank(plan.camera.width, plan.camera.height, channels_of({}));
+    ModelRenderer model(plan);
+    if (options.skip) model.skip_empty_space(lanes::room_of(options));
+    std::atomic<bool> stopped{false};
+    const int rows = thinned_size(image.height, every);
+    tbb::task_arena arena(threads_for(options.threads));
+    arena.execute([&] {
+        tbb::parallel_for(0, rows, [&](int i) {
+            if (options.cancelled && *options.cancelled) stopped = true;
+            const int row = i * every + every / 2;
+            for (int column = every / 2; column < image.width && !stopped; column += every) {
+                TileStatistics statistics;
+                model.render_tile(column, row, column + 1, row + 1, image, statistics);
+            }
+        });
+    });
+    if (stopped) throw Cancelled{};
+    return thinned(image, every);
+}
+
+Image thinned(const Image& image, int every) {
+    Image part = blank(thinned_size(image.width, every), thinned_size(image.height, every), channels_of({}));
+    for (Channel& channel : part.channels) {
+        const std::vector<float>& from = image.find(channel.name)->values;
+        auto to = channel.values.begin();
+        for (int y = every / 2; y < image.height; y += every)
+            for (int x = every / 2; x < image.width; x += every)
+                *to++ = from[static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) +
+                             static_cast<std::size_t>(x)];
+    }
+    return part;
 }
 
 }  // namespace squint

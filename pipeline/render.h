@@ -56,4 +56,10 @@ Rendering render(const Plan& plan, const RenderOptions& options = {});
 /// an animation waits for no new pages.  All that it held is replaced.
 void render(const Plan& plan, const RenderOptions& options, Rendering& into);
 
+/// The colours of pixels (every i + every / 2) in both directions, as a picture: gives errors of a large picture from a
+/// part of it.  One of `every` is rendered as a whole; of more, each pixel by the model.
+Image render_thinned(const Plan& plan, const RenderOptions& options, int every);
+/// The same pixels of an image.
+Image thinned(const Image& image, int every);
+
 }  // namespace squint

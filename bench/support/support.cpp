@@ -4,7 +4,6 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/volume_source.h"
-#include "pipeline/machines/model.h"
 #include "pipeline/record.h"
 #include "truth/reference.h"
 
@@ -117,33 +116,11 @@ std::shared_ptr<const Volume> fresh_copy(const Volume& volume) {
     return std::make_shared<const Volume>(copy);
 }
 
-Image thinned(const Image& image, int every) {
-    const auto count = [&](int size) { return (size - every / 2 + every - 1) / every; };
-    Image part = empty_picture(count(image.width), count(image.height));
-    for (Channel& channel : part.channels) {
-        const Channel* from = image.find(channel.name);
-        for (int y = 0; y < part.height; ++y)
-            for (int x = 0; x < part.width; ++x)
-                channel.values[static_cast<std::size_t>(y * part.width + x)] =
-                    from->values[static_cast<std::size_t>((y * every + every / 2) * image.width + x * every +
-                                                          every / 2)];
-    }
-    return part;
-}
-
 Image thinned_real(const Plan& plan, int frame, int every) {
     Plan whole = plan;
     whole.scene.output = {};
-    const Plan real = real_plan(whole, frame);
-    const ModelRenderer model(real);
-    Image image = empty_picture(real.camera.width, real.camera.height);
-    visit_lattice(image.width, image.height, every, [&](int column, int row) {
-        TileStatistics statistics;
-        model.render_tile(column, row, column + 1, row + 1, image, statistics);
-    });
-    return thinned(image, every);
+    return render_thinned(real_plan(whole, frame), {}, every);
 }
-
 Image thinned_reference(const Plan& plan, int frame, int every) {
     namespace fs = std::filesystem;
     const char* named = std::getenv("SQUINT_BENCH_CACHE");

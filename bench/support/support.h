@@ -32,10 +32,8 @@ std::shared_ptr<const Volume> volume_of(const Scene& scene);
 /// The same voxels in other memory: nothing cached for the volume applies to the copy.
 std::shared_ptr<const Volume> fresh_copy(const Volume& volume);
 
-/// Pixels (every * i + every / 2) in both directions, as a picture: gives errors of a large picture from a
-/// part of it.
-Image thinned(const Image& image, int every);
-/// The same part of the picture without rounding (preset `real`), and of the reference.  The reference is
+using squint::thinned;
+/// What thinned() leaves of the picture without rounding (preset `real`), and of the reference.  The reference is
 /// kept on disk, in SQUINT_BENCH_CACHE or the temporary folder, by all that decides it.
 Image thinned_real(const Plan& plan, int frame, int every);
 Image thinned_reference(const Plan& plan, int frame, int every);

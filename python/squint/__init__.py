@@ -97,7 +97,7 @@ def render(
 ) -> dict[str, Any]:
     """Renders a scene.
 
-    error: measure against the same scene in double (up to eight more pictures); reference: against the exact integral
+    error: measure against the same scene in double, as squint render --error does; reference: against the exact integral
     along each ray; audit: count what every wire carried.  threads 0 is one a processor; frame: of a turntable.
     layout: how voxels lie for the fast path: "linear" (as they are), "cells" (blocks of their own, faster), or "auto":
     cells where something is visible and half of the free memory holds them.  The picture is the same.
