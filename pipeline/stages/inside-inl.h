@@ -191,9 +191,12 @@ HWY_INLINE LightPlaces<W> places_of_light(const InsideStage& s, const PrefixLook
         places.near = places.far = place(lean), places.share = zero;
     }
     if (!p.predicts) return places;
-    const auto has_wall = zero < cut.wall;
+    // A slab with an opaque front ends there, in front of the entry that ends it else.
+    const auto starts_in_wall =
+        zero < (p.as_printed ? zero : select(is_opaque(p.entries, cut.front), one, zero));
+    const auto has_wall = (zero < cut.wall) | starts_in_wall;
     if (!any(has_wall)) return places;
-    const W way = way_to_wall(cut, s.to_way);
+    const W way = select(starts_in_wall, zero, way_to_wall(cut, s.to_way));
     const W behind =
         within(one - min(quantise(opacity_of_depth(p.entries.opacity, depth), s.to_behind), one), 0, kOne);
     const W before = min(quantise(place(lean) * way, s.to_along), way);

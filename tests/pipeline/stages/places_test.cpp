@@ -118,6 +118,16 @@ TEST(LightPlaces, AreTheWalls) {
             EXPECT_GT(there.share, Word{1} << (kShareBits - 1));
             EXPECT_EQ(here.share, Word{1} << kShareBits);
         }
+        // A front between two opaque entries is opaque, whatever entry comes next.
+        for (const auto& [front, back] :
+             {std::pair{200.25, 200.75}, {200.75, 200.25}, {200.25, 202.0}, {200.5, 20.0}}) {
+            const LightPlaces<Word> inside = places<Word>(plan, front, back);
+            EXPECT_EQ(inside.near, 0) << rule << ' ' << front << ' ' << back;
+            EXPECT_EQ(inside.far, 0) << rule << ' ' << front << ' ' << back;
+            const LightPlaces<Exact> exact = places<Exact>(plan, front, back);
+            EXPECT_EQ(way(exact.near), 0) << rule << ' ' << front << ' ' << back;
+            EXPECT_EQ(way(exact.far), 0) << rule << ' ' << front << ' ' << back;
+        }
     }
 }
 
