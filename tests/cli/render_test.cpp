@@ -140,7 +140,8 @@ TEST_F(Render, ProvesABoundAndKeepsItBesideThePicture) {
     EXPECT_EQ(same.json()["pictures"][0]["hash"], picture["hash"]) << "bounds are no part of the picture";
     const Outcome text = squint("render" + unlit + "--bound -o b.exr");
     EXPECT_NE(text.err.find("bound, proven: no pixel is more than"), std::string::npos) << text.err;
-    expect_refusal(squint("render" + kSmall + "--set shading.exaggeration=1 --bound -o b.exr"), "--bound");
+    expect_refusal(squint("render" + kSmall + "--set classification.as_printed=true --bound -o b.exr"),
+                   "--bound");
 }
 
 TEST_F(Render, ErrorIsReportedAndAttributedToStages) {
