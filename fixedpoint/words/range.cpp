@@ -89,13 +89,23 @@ Range absolute(Range x) {
 Range select(Perhaps, Range yes, Range no) {
     return {std::min(yes.low, no.low), std::max(yes.high, no.high)};
 }
+namespace {
+template <class T>
+Range range_of_column(const T* word, int rows, int columns) {
+    T low = *word, high = *word;
+    for (int row = 1; row < rows; ++row) {
+        word += columns;
+        low = std::min(low, *word), high = std::max(high, *word);
+    }
+    return {low, high};
+}
+}  // namespace
 Range gather(const Table& table, Range, int column) {
     note_wire(WordTag<Range>{}, table.wire_of(column));
-    Range all{table.word(0, column), table.word(0, column)};
-    for (int row = 1; row < table.rows(); ++row)
-        all = {std::min<Int128>(all.low, table.word(row, column)),
-               std::max<Int128>(all.high, table.word(row, column))};
-    return noted(all);
+    const auto of = [&](const auto* words) {
+        return range_of_column(words + column, table.rows(), table.columns());
+    };
+    return noted(table.narrow() ? of(table.narrow()) : of(table.wide()));
 }
 Range blend(Range v0, Range v1, Range weight, int weight_bits) {
     const Range difference = v1 - v0;
