@@ -89,11 +89,11 @@ Drawn draw_scene(unsigned seed, bool pips = false) {
     return {scene, volume};
 }
 
-/// One view of a scene: the greatest certificate and the greatest error, LSB8.
+/// One view of a scene: the greatest certificate, where asked for, and the greatest error, LSB8.
 struct Seen {
     double certificate = 0, error = 0;
 };
-Seen seen_in(Scene scene, const std::shared_ptr<const Volume>& volume, Draw& draw) {
+Seen seen_in(Scene scene, const std::shared_ptr<const Volume>& volume, Draw& draw, bool certified = false) {
     scene.camera = {};
     scene.camera.projection = draw.any_of<Projection>();
     scene.camera.azimuth = draw.one_of({0.0, 90.0, draw.real(0, 360), draw.real(0, 360)});
@@ -114,6 +114,7 @@ Seen seen_in(Scene scene, const std::shared_ptr<const Volume>& volume, Draw& dra
             seen.error =
                 std::max(seen.error, 255 * std::abs(static_cast<double>(words.find(channel)->values[i]) -
                                                     static_cast<double>(real.find(channel)->values[i])));
+    if (!certified) return seen;
     CertificateOptions options;
     options.threads = 1;
     seen.certificate = certify(plan, options).most;
@@ -141,7 +142,7 @@ void check_scenes(bool pips) {
             EXPECT_LE(bound.most, bound.by_blocks);
             Draw draw(seed + 100000);
             for (int view = 0; view < 4; ++view) {
-                const Seen seen = seen_in(d.scene, d.volume, draw);
+                const Seen seen = seen_in(d.scene, d.volume, draw, true);
                 above += seen.certificate > bound.most;
                 if (seen.error > 0.05) closest = std::max(closest, seen.error / bound.most);
                 // Pictures are kept in float32; a certificate of all of a pixel may pass 255.
@@ -179,8 +180,8 @@ TEST(SceneBound, PassesFullScaleWhereRoundingsOfCompositingDo) {
     EXPECT_LE(most, bound.most);
 }
 
-class HardSceneBound : public ::testing::TestWithParam<const char*> {};
-TEST_P(HardSceneBound, IsExceededByNoViewOfTheHardCases) {
+class SceneBoundOfCases : public ::testing::TestWithParam<const char*> {};
+TEST_P(SceneBoundOfCases, IsExceededByNoView) {
     const std::string method = GetParam();
     unsigned bounded = 0;
     for (const auto& file : std::filesystem::directory_iterator(SQUINT_SOURCE_DIR "/configs/hard")) {
@@ -201,7 +202,7 @@ TEST_P(HardSceneBound, IsExceededByNoViewOfTheHardCases) {
     }
     EXPECT_GE(bounded, method == "pips" ? 8u : 15u);
 }
-INSTANTIATE_TEST_SUITE_P(SceneBound, HardSceneBound, ::testing::Values("pc", "pips"),
+INSTANTIATE_TEST_SUITE_P(Hard, SceneBoundOfCases, ::testing::Values("pc", "pips"),
                          [](const auto& method) { return std::string(method.param); });
 
 Plan built_in_plan(std::vector<std::string> overrides) {
