@@ -192,8 +192,8 @@ Certificate certify(const Plan& plan, const CertificateOptions& options) {
         });
     };
     const Plan real = std::holds_alternative<PostClassification>(plan.method) ? plan : real_plan(plan);
-    const auto prefix_of = [&](const auto& words) {
-        return BoundedPrefix{words.prefix, real.inside, function};
+    const auto prefix_of = [&]<class M>(const M& words) {
+        return BoundedPrefix{words.prefix, std::get<M>(real.method).prefix, real.inside, function};
     };
     if (const auto* words = std::get_if<PostClassification>(&plan.method)) {
         certify_all(BoundedPostClassification{*words, function});

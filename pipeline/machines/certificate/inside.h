@@ -32,9 +32,10 @@ struct PieceLight<Bounded> {
 
 namespace squint {
 
-/// What light inside a slab asks of a method with prefix sums.  `real`: the stage of the plan that rounds nothing.
+/// What light inside a slab asks of a method with prefix sums.  `exact`, `real`: the same lookup, with rows and inputs of
+/// its own, and the stage of the plan that rounds nothing.
 struct BoundedPrefix {
-    const PrefixLookup& words;
+    const PrefixLookup &words, &exact;
     const InsideStage& real;
     const Function& function;
 };

@@ -21,8 +21,8 @@ struct PlacesReach {
 
 /// How far the function's extinction on a straight way is from what T's rows say of it: none where T bends.
 double off_by_rows(const BoundedPrefix& p, double low, double high) {
-    if (p.words.curved) return 0;
-    return std::ldexp(p.function.slope(Function::depth, low, high), -p.words.sub_entry_bits - 1);
+    if (p.exact.curved) return 0;
+    return std::ldexp(p.function.slope(Function::depth, low, high), -p.exact.sub_entry_bits - 1);
 }
 /// The mean extinction in a quarter of a way, whose ends may be `off` beside it.
 Reach quarter_mean(const BoundedPrefix& p, double a, double b, double off, double last) {
@@ -85,7 +85,7 @@ std::optional<PlacesReach> all_places(const InsideStage& s, const BoundedPrefix&
         mean[k].low = std::max(mean[k].low, 0.0);
     }
     constexpr double kLeastSpan = 16;  // raw: as places_of_light
-    const double raw = std::ldexp(1.0, p.words.entries.input_fraction),
+    const double raw = std::ldexp(1.0, p.exact.entries.input_fraction),
                  moves = ends.from_off + end_off + kAway * span;
     const bool may_be_short = (span - moves) * raw < kLeastSpan, is_short = (span + moves) * raw < kLeastSpan;
     std::array<Reach, kQuarters - 1> y;

@@ -76,7 +76,7 @@ TEST_P(PlacesOfLight, HoldForAllThatASlabMayBeAndHalvedDoNot) {
         const Function function(plan);
         const PrefixLookup& words = std::get<PowerSeriesOfOrder1>(plan.method).prefix;
         const PrefixLookup& exact = std::get<PowerSeriesOfOrder1>(real.method).prefix;
-        const BoundedPrefix prefix{words, real.inside, function};
+        const BoundedPrefix prefix{words, exact, real.inside, function};
         const double unit = std::ldexp(1.0, words.entries.input_fraction),
                      full = std::ldexp(1.0, words.entries.length_fraction);
         const auto highest = static_cast<double>(function.last()) * unit;

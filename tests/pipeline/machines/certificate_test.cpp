@@ -208,6 +208,13 @@ TEST(LitCertificate, OfLightThatFadesByTablesIsExceededByNoPixelOfPicturesDrawnA
                 {std::string("classification.method=") + method, std::string("shading.inside=") + rule});
 }
 
+// Words whose inputs have few bits take more slabs for too short to have places than the doubles do.
+TEST(LitCertificate, KnowsThatPlacesWithoutRoundingHaveInputsOfTheirOwn) {
+    const Compared all = compared(draw_case(415809, true).plan);
+    EXPECT_EQ(all.over, "");
+    EXPECT_GT(all.error, 10) << "or the case is none any more";
+}
+
 // A point that its row makes transparent, between nodes that are not: words do not light it.
 TEST(LitCertificate, KnowsThatATransparentSlabIsNotLitByItsTables) {
     const Case c = draw_case(2082, true);
