@@ -6,6 +6,9 @@
 #include "pipeline/stages/gradient.h"
 #include "pipeline/stages/shading.h"
 
+#include <cstdint>
+#include <string>
+
 namespace squint {
 
 /// Voxels' gradient by central differences.
@@ -15,6 +18,12 @@ using DefaultGradient =
           DropsBits<&GradientStage::to_first>, DropsBits<&GradientStage::to_second>,
           DropsBits<&GradientStage::to_gradient>,
           DropsBitsUnless<&GradientStage::to_scaled, &GradientStage::isotropic>>;
+
+/// Why a plan's gradients are not these, of voxels whose differences fit 16 bits; empty where they are.
+inline std::string narrow_gradients_missing(std::int64_t largest_voxel, const GradientStage& stage) {
+    if (largest_voxel >= 1 << 15) return "voxels have 16 bits";
+    return DefaultGradient::missing(stage);
+}
 
 /// A white light on one side of things, orthographic Blinn-Phong by squarings of straight colours; sums that
 /// no limit meets but the clamps that follow.

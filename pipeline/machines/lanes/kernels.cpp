@@ -49,8 +49,10 @@ StageKernels kernels_for(const Plan& plan, const StageWays& ways, const VoxelSou
     voxel_kernels(target, source, kernels);
     classification_kernel(target, plan, ways.classification, kernels);
     point_kernels(target, plan, ways, kernels);
+    gradient_kernels(target, plan, ways, kernels);
     shading_kernels(target, plan, ways, kernels);
     inside_kernels(target, plan, ways, kernels);
+    fading_kernels(target, plan, ways, kernels);
     wall_kernels(target, ways, kernels);
     compositing_kernel(target, plan, ways.compositing, kernels);
     projection_kernel(target, plan, kernels);

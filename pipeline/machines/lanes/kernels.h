@@ -178,7 +178,9 @@ void sampling_kernels(std::int64_t target, const Plan& plan, const StageWays& wa
 void voxel_kernels(std::int64_t target, const VoxelSource& source, StageKernels& kernels);
 void classification_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);
 void point_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels);
+void gradient_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels);
 void shading_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels);
+void fading_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels);
 void inside_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels);
 void wall_kernels(std::int64_t target, const StageWays& ways, StageKernels& kernels);
 void compositing_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);

@@ -1,4 +1,4 @@
-// Light inside slabs, in lanes: gradients between a slab's ends, and slabs in pieces.
+// Light inside slabs, in lanes: its places, gradients between a slab's ends, and slabs in pieces.
 #include "pipeline/machines/lanes/targets.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -11,7 +11,6 @@
 #include "pipeline/machines/lanes/packing-inl.h"
 #include "pipeline/stages/inside-inl.h"
 #include "pipeline/stages/location-inl.h"
-#include "pipeline/stages/shading-inl.h"
 
 #include <algorithm>
 #include <array>
@@ -25,11 +24,6 @@ using lanes::LitSamples;
 using lanes::Samples;
 using lanes::Word;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(hn::ScalableTag<Word>()));
-
-template <class L>
-HWY_INLINE std::array<L, 3> load_three(const lanes::Batch (&from)[3], int at) {
-    return {load<L>(from[0].v + at), load<L>(from[1].v + at), load<L>(from[2].v + at)};
-}
 
 /// Packs the samples at the ends of visible slabs, each once.
 int gather_slab_ends(const Plan& plan, const lanes::RayPacket& rays, int steps, const Samples& s,
@@ -213,55 +207,6 @@ void find_places(const Plan& plan, int count, const LitSamples& lit, lanes::Slab
         store(places.share, light.share.v + at);
     }
 }
-/// Where it lies as it fades.
-template <class L, class M>
-void find_fades(const Plan& plan, int count, const LitSamples& lit, lanes::SlabLight& light) {
-    const M& method = std::get<M>(plan.method);
-    for (int at = 0; at < count; at += static_cast<int>(L::count())) {
-        const L front = load<L>(lit.input[0].v + at), back = load<L>(lit.input[1].v + at),
-                length = load<L>(lit.length.v + at);
-        const Slab<L> slab{load_three<L>(lit.color, at), load<L>(lit.alpha.v + at)};
-        FadingLight<L> fades;
-        if constexpr (requires { method.fades; })
-            fades = fading_light(method, front, back, length, slab);
-        else
-            fades = fading_light_of_quarters(plan.inside, method, front, back, length, slab);
-        store(constant<L>(0), light.way[0].v + at), store(fades.end, light.way[1].v + at);
-        for (std::size_t k = 0; k < static_cast<std::size_t>(fades.count); ++k)
-            for (std::size_t c = 0; c < 4; ++c) store(fades.part[k][c], light.part[k][c].v + at);
-    }
-}
-template <class L>
-RayWords<L> stored_ray(const ShadingStage& shading, const LitSamples& lit, int at) {
-    RayWords<L> ray;
-    if (!shading.needs_ray()) return ray;
-    ray.view = load_three<L>(lit.view, at);
-    for (std::size_t l = 0; l < static_cast<std::size_t>(shading.lights); ++l)
-        ray.half[l] = load_three<L>(lit.half[l], at);
-    return ray;
-}
-template <class L>
-void shade_fading_slabs(const Plan& plan, int count, const lanes::SlabLight& light, const LitSamples& far,
-                        LitSamples& lit) {
-    const int parts = plan.inside.rule == InsideRule::linear ? 2 : 4;
-    for (int at = 0; at < count; at += static_cast<int>(L::count())) {
-        FadingNormals<L> ends{{load_three<L>(lit.normal, at), load_three<L>(far.normal, at)},
-                              {constant<L>(0), constant<L>(0)}};
-        if (plan.gradient.fades)
-            ends.certain = {load<L>(lit.confidence.v + at), load<L>(far.confidence.v + at)};
-        share_normal(ends.normal[0], ends.normal[1]);
-        FadingLight<L> fades{parts, {}, constant<L>(0)};
-        for (std::size_t k = 0; k < static_cast<std::size_t>(parts); ++k)
-            for (std::size_t c = 0; c < 4; ++c) fades.part[k][c] = load<L>(light.part[k][c].v + at);
-        std::array<L, 3> color;
-        shade_fading(plan.shading, stored_ray<L>(plan.shading, lit, at), ends.normal, ends.certain, fades,
-                     color);
-        for (std::size_t a = 0; a < 3; ++a) {
-            store(ends.normal[0][a], lit.normal[a].v + at);
-            store(color[a], lit.color[a].v + at);
-        }
-    }
-}
 template <class L>
 void join_slab_places(const Plan& plan, int count, const lanes::SlabLight& light, const LitSamples& far,
                       LitSamples& lit) {
@@ -316,22 +261,11 @@ void inside_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::St
     lanes::with_word<Lanes, kNothing>(ways.classification, [&]<class L>() {
         kernels.cut = &cut_sixteen<L>;
         if (lights_at_places(plan.inside.rule)) kernels.find_light = &find_places<L>;
-        if (!lights_fade(plan.inside.rule)) return;
-        std::visit(
-            [&]<class M>(const M& m) {
-                constexpr bool kInFloats =
-                    !std::is_same_v<M, MomentSeries>;  // else its floats are the model's
-                if constexpr (requires { m.prefix; } && (kInFloats || !RealWord<L>))
-                    if constexpr (requires { m.fades; } || !M::kPremultiplied)
-                        kernels.find_light = &find_fades<L, M>;
-            },
-            plan.method);
     });
     lanes::with_word<Lanes, kNothing>(ways.gradient,
                                       [&]<class L>() { kernels.lerp_ends = &lerp_slab_ends<L>; });
     lanes::with_word<Lanes, kNothing>(ways.shading, [&]<class L>() {
         kernels.join_places = &join_slab_places<L>;
-        kernels.shade_fading = &shade_fading_slabs<L>;
         kernels.find_cuts = &find_cuts<L>;
     });
     lanes::with_word<Lanes, kNothing>(plan.lit ? ways.shading : ways.classification,

@@ -1,4 +1,4 @@
-// Stages 3 and 5 in lanes, over samples that light falls on.
+// Stage 5 in lanes, over packed samples.
 #include "pipeline/machines/lanes/targets.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -7,106 +7,15 @@
 
 #include "fixedpoint/words/all_lanes-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
+#include "pipeline/machines/lanes/packing-inl.h"
 #include "pipeline/stages/default_facts.h"
-#include "pipeline/stages/gradient-inl.h"
 #include "pipeline/stages/shading-inl.h"
 
-#include <algorithm>
 #include <array>
 
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 namespace {
-
-/// A neighbourhood whose voxels are loaded as they are asked for.  kNarrow: differences and weights fit 16 bits,
-/// for voxels lie below 2^15 and the stage is DefaultGradient's.
-template <class L, bool kNarrow>
-struct StoredNeighbourhood {
-    const lanes::Batch* pair;
-    int place;
-    bool cross;  // see LitSamples::pair
-    L at(int x, int y, int z) const {
-        if (cross && lanes::is_outer_row(y, z)) return half_of(words(0, y, z), x == 2);
-        return half_of(words(x / 2, y, z), x % 2 != 0);
-    }
-    /// Neighbourhood's; narrow ones two differences a word.
-    HWY_INLINE L along_x(const GradientStage& s, int y, int z, int axis, L weight) const {
-#if HWY_TARGET != HWY_SCALAR
-        if constexpr (kNarrow) {
-            const hn::ScalableTag<std::int32_t> d;
-            const hn::ScalableTag<std::int16_t> d16;
-            const auto ahead = axis == 0 ? words(1, y, z).v : axis == 1 ? middle(y + 1, z) : middle(y, z + 1);
-            const auto behind = axis == 0   ? words(0, y, z).v
-                                : axis == 1 ? middle(y - 1, z)
-                                            : middle(y, z - 1);
-            const auto differences =
-                hn::BitCast(d, hn::Sub(hn::BitCast(d16, ahead), hn::BitCast(d16, behind)));
-            return blend_pairs<L::kKnown>(differences, pair_weights(weight.v, s.weight_bits), 0, s.to_first);
-        }
-#endif
-        return lerped_difference(s, *this, y, z, axis, weight);
-    }
-
-  private:
-    HWY_INLINE L words(int x, int y, int z) const {
-        return load<L>(pair[(z * 4 + y) * 2 + x].v + place);
-    }
-    /// The middle two of a row's four voxels, of a cross.
-    HWY_INLINE auto middle(int y, int z) const {
-        if (lanes::is_outer_row(y, z)) return words(0, y, z).v;
-        return inner_pair(words(0, y, z).v, words(1, y, z).v);
-    }
-};
-
-template <class L>
-HWY_INLINE std::array<L, 3> load_three(const lanes::Batch (&from)[3], int at) {
-    return {load<L>(from[0].v + at), load<L>(from[1].v + at), load<L>(from[2].v + at)};
-}
-
-/// F: what is known of the stage.
-template <class L, class F>
-HWY_INLINE std::array<L, 3> stored_gradient(const GradientStage& s, const lanes::LitSamples& lit, int at) {
-    if (s.rule == GradientRule::central_samples) {
-        const auto between = [&](int axis) SQUINT_WRITTEN_OUT {
-            const auto& scalars = lit.beside[axis];
-            const L behind = load<L>(scalars[0].v + at), ahead = load<L>(scalars[1].v + at);
-            return to_world(s, sample_difference(s, ahead, behind), axis);
-        };
-        return {between(0), between(1), between(2)};
-    }
-    const StoredNeighbourhood<L, !F::kNone> near{lit.pair, at, s.rule == GradientRule::central};
-    const std::array<L, 3> weight = load_three<L>(lit.weight, at);
-    const auto along = [&](int axis) SQUINT_WRITTEN_OUT {
-        return to_world(s, voxel_difference(s, near, weight, axis), axis);
-    };
-    return {along(0), along(1), along(2)};
-}
-
-/// The first half of stage 3: raw gradients, as 32-bit words.  G: lanes whose lerps may need to be wider than
-/// what follows.  It has a loop of its own because each vector is one long chain of operations: there, the
-/// chains of several vectors overlap.
-template <class G, class F>
-void find_gradients(const Plan& plan, int count, lanes::LitSamples& lit) {
-    GradientStage stage = plan.gradient;
-    F::assume(stage);
-    for (int at = 0; at < count; at += static_cast<int>(G::count())) {
-        const std::array<G, 3> gradient = stored_gradient<G, F>(stage, lit, at);
-        for (std::size_t a = 0; a < 3; ++a) store(gradient[a], lit.gradient[a].v + at);
-    }
-}
-
-/// The second half of stage 3: normals.
-template <class L, class F>
-void find_normals(const Plan& plan, int count, lanes::LitSamples& lit) {
-    GradientStage stage = plan.gradient;
-    F::assume(stage);
-    for (int at = 0; at < count; at += static_cast<int>(L::count())) {
-        const std::array<L, 3> gradient = load_three<L>(lit.gradient, at);
-        const std::array<L, 3> normal = normalise(stage, gradient);
-        for (std::size_t a = 0; a < 3; ++a) store(normal[a], lit.normal[a].v + at);
-        if (stage.fades) store(confidence(stage, gradient), lit.confidence.v + at);
-    }
-}
 
 /// Stage 5.
 template <class L, class F>
@@ -130,39 +39,27 @@ void shade_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
     }
 }
 
+// Why light is not the default scene's; empty where it is.
+std::string default_light_missing(const Plan& plan, const lanes::StageWays& ways, KnownRescales known) {
+    for (const lanes::StageWay& way : {ways.gradient, ways.shading})
+        if (std::string narrow = lanes::why_not_narrow(way, known); !narrow.empty()) return narrow;
+    std::string gradient = narrow_gradients_missing(plan.volume->largest, plan.gradient);
+    return gradient.empty() ? DefaultShading::missing(plan.shading) : gradient;
+}
+
 }  // namespace
 
 void shading_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::StageKernels& kernels) {
-    using NoGradient = NoFacts<GradientStage>;
     using NoShading = NoFacts<ShadingStage>;
-    if (ways.gradient.is_float) {
-        using L = Lanes<float, KnownRescales::nothing>;
-        kernels.find_gradients = &find_gradients<L, NoGradient>;
-        kernels.find_normals = &find_normals<L, NoGradient>;
-        kernels.shade = &shade_samples<L, NoShading>;
-        return;
-    }
     constexpr KnownRescales kEven = KnownRescales::halves_to_even;
-    const bool narrow = plan.volume->largest < 1 << 15 && DefaultGradient::hold(plan.gradient);
-    std::string missing;
-    for (const lanes::StageWay& way : {ways.gradient, ways.shading})
-        if (missing.empty()) missing = lanes::why_not_narrow(way, kEven);
-    if (missing.empty() && plan.volume->largest >= 1 << 15) missing = "voxels have 16 bits";
-    if (missing.empty()) missing = DefaultGradient::missing(plan.gradient);
-    if (missing.empty()) missing = DefaultShading::missing(plan.shading);
-    kernels.chose(lanes::Segment::light, missing.empty() ? "light.default" : "light", missing);
-    lanes::with_integer_word<Lanes, kEven>(ways.gradient, [&]<class G>() {
-        kernels.find_gradients = &find_gradients<G, NoGradient>;
-        if constexpr (std::is_same_v<G, Lanes<std::int32_t, kEven>>)
-            if (narrow) kernels.find_gradients = &find_gradients<G, DefaultGradient>;
-    });
-    lanes::with_integer_word<Lanes, kEven>(ways.shading, [&]<class L>() {
-        kernels.find_normals = &find_normals<L, NoGradient>;
+    if (!ways.gradient.is_float) {
+        const std::string reason = default_light_missing(plan, ways, kEven);
+        kernels.chose(lanes::Segment::light, reason.empty() ? "light.default" : "light", reason);
+    }
+    lanes::with_word<Lanes, kEven>(ways.shading, [&]<class L>() {
         kernels.shade = &shade_samples<L, NoShading>;
-        if constexpr (std::is_same_v<L, Lanes<std::int32_t, kEven>>) {
-            if (narrow) kernels.find_normals = &find_normals<L, DefaultGradient>;
+        if constexpr (std::is_same_v<L, Lanes<std::int32_t, kEven>>)
             if (DefaultShading::hold(plan.shading)) kernels.shade = &shade_samples<L, DefaultShading>;
-        }
     });
 }
 

@@ -29,11 +29,6 @@ using lanes::Word;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(hn::ScalableTag<Word>()));
 using Words = hn::Vec<hn::ScalableTag<Word>>;
 
-template <class L>
-HWY_INLINE std::array<L, 3> load_three(const lanes::Batch (&from)[3], int at) {
-    return {load<L>(from[0].v + at), load<L>(from[1].v + at), load<L>(from[2].v + at)};
-}
-
 /// Bits of cells, a vector at a time.
 class WallBits {
     static constexpr int kBits = lanes::kBlockBits;

@@ -1,4 +1,5 @@
-// Packs the wanted lanes of several vectors side by side.  Compiled once per SIMD target.
+// What packed samples are made by and read by: the wanted lanes of several vectors side by side.  Compiled once per
+// SIMD target.
 #if defined(SQUINT_PIPELINE_MACHINES_LANES_PACKING_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SQUINT_PIPELINE_MACHINES_LANES_PACKING_INL_H
 #undef SQUINT_PIPELINE_MACHINES_LANES_PACKING_INL_H
@@ -6,6 +7,7 @@
 #define SQUINT_PIPELINE_MACHINES_LANES_PACKING_INL_H
 #endif
 
+#include "fixedpoint/words/lanes-inl.h"
 #include "pipeline/machines/lanes/packet.h"
 
 #include <hwy/highway.h>
@@ -70,6 +72,12 @@ class Packing {
     int count_;
     Indices from_;
 };
+
+/// Three words each of the buffers.
+template <class L>
+HWY_INLINE std::array<L, 3> load_three(const lanes::Batch (&from)[3], int at) {
+    return {load<L>(from[0].v + at), load<L>(from[1].v + at), load<L>(from[2].v + at)};
+}
 
 }  // namespace squint::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
