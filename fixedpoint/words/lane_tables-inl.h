@@ -243,6 +243,18 @@ HWY_INLINE Lanes<std::int32_t, K> blend_pairs(hn::Vec<hn::ScalableTag<std::int32
         return {shift_right_same(sum(offset + static_cast<std::int32_t>(to.bias)), to.shift)};
     return quantise(Lanes<std::int32_t, K>{sum(offset)}, to);
 }
+/// Rows `row` and `row + 1` of a table of two columns.
+template <KnownRescales K>
+HWY_INLINE std::array<std::array<Lanes<std::int32_t, K>, 2>, 2> load_two_by_two(const Table& table,
+                                                                                Lanes<std::int32_t, K> row) {
+    assert(table.columns() == 2);
+    using L = Lanes<std::int32_t, K>;
+    alignas(64) std::int32_t at[HWY_LANES(std::int32_t)];
+    hn::Store(row.v, hn::ScalableTag<std::int32_t>(), at);
+    const std::int32_t* words = table.narrow();
+    const auto both = load_quads([&](int lane) { return words + std::int64_t{2} * at[lane]; });
+    return {{{L{both[0]}, L{both[1]}}, {L{both[2]}, L{both[3]}}}};
+}
 /// Rows `row` and `row + 1` of a table with four columns.
 template <KnownRescales K>
 HWY_INLINE std::array<std::array<Lanes<std::int32_t, K>, 4>, 2> load_two_rows(const std::int32_t* rows,

@@ -40,26 +40,42 @@ HWY_INLINE W depth_at(const PrefixLookup& p, const EntryPosition<W>& at) {
                   (p.total + 1) << p.gained_bits());
 }
 
-/// The difference of a prefix sum between two positions, exact, with `bits` more fraction bits than its
-/// words, which rise by at most `most_rise` from row to row.
+/// A prefix sum at a position between two rows: the first row's, and `bits` more fraction bits of what it has risen
+/// since, by at most `most_rise` a row.
+template <class W>
+struct PrefixPlace {
+    W sum, risen;
+};
+template <class W>
+HWY_INLINE PrefixPlace<W> prefix_place(W sum, W next, W fraction, int bits, std::int64_t most_rise) {
+    return {sum, within(fraction, 0, std::int64_t{1} << bits) * within(next - sum, 0, most_rise)};
+}
+/// The difference of a prefix sum between two positions, exact, with `bits` more fraction bits than its words.
+template <class W>
+HWY_INLINE Wide<W> prefix_difference(const PrefixPlace<W>& front, const PrefixPlace<W>& end, int bits) {
+    return wide_sum(end.sum - front.sum, bits, end.risen - front.risen);
+}
 template <class W>
 HWY_INLINE Wide<W> prefix_difference(const Table& table, const EntryPosition<W>& front,
                                      const EntryPosition<W>& end, int column, int bits,
                                      std::int64_t most_rise) {
-    const W from = gather(table, front.entry, column), to = gather(table, end.entry, column);
-    const auto part = [&](const EntryPosition<W>& at, W sum) SQUINT_WRITTEN_OUT {
-        const W rise = within(gather(table, at.entry + constant<W>(1), column) - sum, 0, most_rise);
-        return within(at.fraction, 0, std::int64_t{1} << bits) * rise;
+    const auto place = [&](const EntryPosition<W>& at) SQUINT_WRITTEN_OUT {
+        return prefix_place(gather(table, at.entry, column), gather(table, at.entry + constant<W>(1), column),
+                            at.fraction, bits, most_rise);
     };
-    return wide_sum(to - from, bits, part(end, to) - part(front, from));
+    return prefix_difference(place(front), place(end), bits);
 }
 /// What a prefix sum loses to its bend, for a change over a row by a column of `bends` (depth_at).
 template <class W>
-HWY_INLINE Wide<W> bend_at(const Table& bends, const EntryPosition<W>& at, int column, int place_bits) {
+HWY_INLINE Wide<W> bend_at(W fraction, W bend, int place_bits) {
     const std::int64_t one = std::int64_t{1} << place_bits;
-    const W part = within(at.fraction, 0, one);
+    const W part = within(fraction, 0, one);
     const W hollow = within(part * (constant<W>(one) - part), 0, one * one / 4);
-    return wide_product(hollow, gather(bends, at.entry, column));
+    return wide_product(hollow, bend);
+}
+template <class W>
+HWY_INLINE Wide<W> bend_at(const Table& bends, const EntryPosition<W>& at, int column, int place_bits) {
+    return bend_at(at.fraction, gather(bends, at.entry, column), place_bits);
 }
 template <class W>
 HWY_INLINE Wide<W> bend_at(const PrefixLookup& p, const EntryPosition<W>& at) {
@@ -158,15 +174,46 @@ inline Real<double> exact_depth(const PrefixLookup& p, const CutSlab<Real<double
                      p.to_shorter);
 }
 
+/// Words that load two rows of a table of two columns at once.
+template <class W>
+concept LoadsTwoByTwo = requires(const Table& table, W word) {
+    { load_two_by_two(table, word) } -> std::same_as<std::array<std::array<W, 2>, 2>>;
+};
+/// T at a position between two rows, and what it loses there to its bend.
+template <class W>
+struct DepthPlace {
+    PrefixPlace<W> straight;
+    Wide<W> bend;
+};
+template <class W>
+HWY_INLINE DepthPlace<W> depth_place(const PrefixLookup& p, const EntryPosition<W>& at) {
+    const int bits = p.place_bits();
+    const auto place = [&](W sum, W next) SQUINT_WRITTEN_OUT {
+        return prefix_place(sum, next, at.fraction, bits, p.most_rise);
+    };
+    if constexpr (LoadsTwoByTwo<W>)
+        if (p.curved) {
+            const auto rows = load_two_by_two(p.depth, at.entry);
+            return {place(rows[0][0], rows[1][0]), bend_at(at.fraction, rows[0][1], bits)};
+        }
+    DepthPlace<W> there{place(gather(p.depth, at.entry, 0), gather(p.depth, at.entry + constant<W>(1), 0)),
+                        {}};
+    if (p.curved) there.bend = bend_at(p, at);
+    return there;
+}
 /// The difference of T between two positions in its rows, exact, with gained_bits() more fraction bits than its
 /// words.
 template <class W>
+HWY_INLINE Wide<W> depth_between(const PrefixLookup& p, const DepthPlace<W>& from, const DepthPlace<W>& to) {
+    const int bits = p.place_bits();
+    Wide<W> difference = prefix_difference(from.straight, to.straight, bits);
+    if (p.curved) difference = shift_left(difference, bits + 1) - (to.bend - from.bend);
+    return absolute(difference);
+}
+template <class W>
 HWY_INLINE Wide<W> depth_between(const PrefixLookup& p, const EntryPosition<W>& from,
                                  const EntryPosition<W>& to) {
-    const int bits = p.place_bits();
-    Wide<W> difference = prefix_difference(p.depth, from, to, 0, bits, p.most_rise);
-    if (p.curved) difference = shift_left(difference, bits + 1) - (bend_at(p, to) - bend_at(p, from));
-    return absolute(difference);
+    return depth_between(p, depth_place(p, from), depth_place(p, to));
 }
 
 /// The optical depth of a cut slab.

@@ -119,16 +119,28 @@ HWY_INLINE W depth_up_to_wall(const PrefixLookup& p, const CutSlab<W>& cut, cons
     if (any(point)) depth = select(point, point_depth(p.entries, cut.front, length), depth);
     return depth;
 }
-/// Lean and spread of even matter (EvenMatter).
-template <class W>
-HWY_INLINE W even_matter(const EvenMatter& even, W depth, int column) {
+/// The lean of even matter, or its lean and its spread (EvenMatter).
+template <std::size_t N, class W>
+HWY_INLINE std::array<W, N> even_matter(const EvenMatter& even, W depth) {
     const int fraction = even.depth_fraction - even.row_bits;
     const std::int64_t one = std::int64_t{1} << fraction;
     const W row = min(floor_shift(depth, fraction), constant<W>(even.rows.rows() - 2));
     const W rest = within(min(depth - shift_left(row, fraction), constant<W>(one)), 0, one);
-    return quantise(blend(gather(even.rows, row, column), gather(even.rows, row + constant<W>(1), column),
-                          rest, fraction),
-                    even.to_row);
+    const auto between = [&](W here, W next) SQUINT_WRITTEN_OUT {
+        return quantise(blend(here, next, rest, fraction), even.to_row);
+    };
+    std::array<W, N> numbers;
+    if constexpr (LoadsTwoByTwo<W>) {
+        const auto rows = load_two_by_two(even.rows, row);
+        for (std::size_t c = 0; c < N; ++c) numbers[c] = between(rows[0][c], rows[1][c]);
+    } else {
+        for (std::size_t c = 0; c < N; ++c) {
+            const int column = static_cast<int>(c);
+            numbers[c] =
+                between(gather(even.rows, row, column), gather(even.rows, row + constant<W>(1), column));
+        }
+    }
+    return numbers;
 }
 
 /// Where along a slab its light comes from: `share` of it, in 1.kShareBits, from `far`, the rest from `near`, both
@@ -152,40 +164,43 @@ HWY_INLINE LightPlaces<W> places_of_light(const InsideStage& s, const PrefixLook
     constexpr std::int64_t kLeastSpan = 16;  // inputs between which quarters' own roundings are small
     const W zero = constant<W>(0), one = constant<W>(kOne);
     const CutSlab<W> cut = cut_at_wall(p, front, back);
-    const auto row_at = [&](W input) {
+    const auto depth_at_input = [&](W input) SQUINT_WRITTEN_OUT {
         EntryPosition<W> at = sub_entry_position(p.entries, p.sub_entry_bits, input);
         at.fraction = within(at.fraction, 0, std::int64_t{1} << p.place_bits());
-        return at;
+        return depth_place(p, at);
     };
-    const EntryPosition<W> start = row_at(cut.front_input);
-    const Wide<W> all = depth_between(p, start, row_at(cut.end_input)), some = divisor<W>(all);
+    const DepthPlace<W> start = depth_at_input(cut.front_input);
+    const Wide<W> all = depth_between(p, start, depth_at_input(cut.end_input));
     const auto is_short = absolute(cut.end_input - cut.front_input) < constant<W>(kLeastSpan);
-    // In so few bits that the products of its remainders fit a double.
-    constexpr int kBits = 10;
-    Rescale to_share = s.to_share;
-    to_share.shift = -kBits, to_share.width = kBits + 1;
-    const auto share_at = [&](int part) {
-        const Wide<W> up_to =
-            depth_between(p, start, row_at(input_between(s, cut.front_input, cut.end_input, part, 2)));
-        const W share = min(divide(up_to, some, to_share), constant<W>(std::int64_t{1} << kBits));
-        return select(is_short, constant<W>(kOne / kQuarters * part), shift_left(share, kShareBits - kBits));
+    const auto up_to = [&](int part) SQUINT_WRITTEN_OUT {
+        return depth_between(p, start,
+                             depth_at_input(input_between(s, cut.front_input, cut.end_input, part, 2)));
     };
-    const std::array<W, 3> y{share_at(1), share_at(2), share_at(3)};
-    const auto square = [&](W share) {
+    std::array<W, 3> y =
+        divide_three(std::array<Wide<W>, 3>{up_to(1), up_to(2), up_to(3)}, divisor<W>(all), s.to_depth_share);
+    for_three([&](std::size_t i) SQUINT_WRITTEN_OUT {
+        const W share = min(y[i], constant<W>(std::int64_t{1} << kDepthShareBits));
+        const auto part = static_cast<std::int64_t>(i) + 1;
+        y[i] = select(is_short, constant<W>(kOne / kQuarters * part),
+                      shift_left(share, kShareBits - kDepthShareBits));
+    });
+    const auto square = [&](W share) SQUINT_WRITTEN_OUT {
         return within(quantise(share * within(one - share, 0, kOne), s.to_square), 0, kOne / 4);
     };
     // 12 L_0 and 36 L_1.
     const W mean = constant<W>(11 * kOne) - shift_left(y[0] + y[2], 2) - shift_left(y[1], 1);
     const W turn = constant<W>(6) * (shift_left(square(y[0]) + square(y[2]), 1) + square(y[1]));
     const W depth = depth_up_to_wall(p, cut, all, length);
-    const W lean = even_matter(s.even, depth, 0);
-    const auto place = [&](W less) {
+    const bool two = s.rule == InsideRule::two_point;
+    const std::array<W, 2> even =
+        two ? even_matter<2>(s.even, depth) : std::array<W, 2>{even_matter<1>(s.even, depth)[0], zero};
+    const W lean = even[0], spread = even[1];
+    const auto place = [&](W less) SQUINT_WRITTEN_OUT {
         const W twelvefold = clamp(mean - quantise(turn * less, s.to_moment), zero, constant<W>(12 * kOne));
         return min(divide(twelvefold, constant<W>(12), s.to_place), constant<W>(std::int64_t{1} << kWayBits));
     };
     LightPlaces<W> places{};
-    if (s.rule == InsideRule::two_point) {
-        const W spread = even_matter(s.even, depth, 1);
+    if (two) {
         places = {place(min(lean + spread, one)), place(lean - spread), constant<W>(kOne / 2)};
     } else {
         places.near = places.far = place(lean), places.share = zero;
@@ -200,7 +215,7 @@ HWY_INLINE LightPlaces<W> places_of_light(const InsideStage& s, const PrefixLook
     const W behind =
         within(one - min(quantise(opacity_of_depth(p.entries.opacity, depth), s.to_behind), one), 0, kOne);
     const W before = min(quantise(place(lean) * way, s.to_along), way);
-    if (s.rule == InsideRule::two_point) {
+    if (two) {
         places.near = select(has_wall, before, places.near), places.far = select(has_wall, way, places.far);
         places.share = select(has_wall, behind, places.share);
     } else {
@@ -226,7 +241,7 @@ HWY_INLINE W lean_between(const InsideStage& s, const PrefixLookup& p, W near, W
     const CutSlab<W> part = cut_at_wall(p, near, far);
     const auto row_at = [&](W input) { return sub_entry_position(p.entries, p.sub_entry_bits, input); };
     const W depth = depth_up_to_wall(p, part, depth_between(p, row_at(near), row_at(part.end_input)), length);
-    return even_matter(s.even, depth, 0);
+    return even_matter<1>(s.even, depth)[0];
 }
 /// The lesser of what is not negative and a limit.
 template <class W>

@@ -88,7 +88,8 @@ InsideStage build_inside(const StageInputs& in, const LocationStage& location) {
     const Spec share{{1, kShareBits, false}, Rounding::rnd_conv, Overflow::sat},
         way{{1, kWayBits, false}, Rounding::rnd_conv, Overflow::sat};
     s.to_share = Rescale(0, share), s.to_way = Rescale(0, way);
-    s.to_share.divides = s.to_way.divides = true;
+    s.to_depth_share = Rescale(0, {{1, kDepthShareBits, false}, Rounding::rnd_conv, Overflow::sat});
+    s.to_depth_share.divides = s.to_share.divides = s.to_way.divides = true;
     s.to_along = Rescale(2 * kWayBits, way), s.to_ahead = Rescale(kShareBits + kWayBits, way);
     s.to_square = Rescale(2 * kShareBits, share);
     s.to_moment = Rescale(2 * kShareBits, {{4, kShareBits, true}, Rounding::rnd_conv, Overflow::sat});

@@ -75,6 +75,8 @@ struct EvenMatter {
 };
 /// Fraction bits of lean and spread, and of shares of a slab's depth and light.
 inline constexpr int kShareBits = 14;
+/// Of a depth over another, so few that the products of its remainders fit a double.
+inline constexpr int kDepthShareBits = 10;
 
 /// Bernstein polynomials of degree 3, or of degree 1, over the quarters of a way: their means there, exact with
 /// kMeanBits fraction bits, and how much they rise.
@@ -126,9 +128,10 @@ struct InsideStage {
     int gained_bits = 0;  // log2 of gradient_scale
     Rescale to_way_between, to_between;
     EvenMatter even;
-    Rescale to_share;   // a depth over another
-    Rescale to_square;  // a product of shares
-    Rescale to_moment;  // 36 L_1 times a share
+    Rescale to_depth_share;  // a depth over another
+    Rescale to_share;        // a quarter's light over the slab's
+    Rescale to_square;       // a product of shares
+    Rescale to_moment;       // 36 L_1 times a share
     Rescale to_place;
     Rescale to_way;     // a way over another
     Rescale to_along;   // a way along another
@@ -150,9 +153,10 @@ struct InsideStage {
         for (Rescale& r : to_location) v(r);
         for (Rescale& r : to_input) v(r);
         for (Rescale& r : to_length) v(r);
-        for (Rescale* r : {&to_way_between, &to_between, &even.to_row, &to_share, &to_square, &to_moment,
-                           &to_place, &to_way, &to_along, &to_ahead, &to_behind, &to_parts, &to_shift,
-                           &to_color, &to_white, &to_scaled, &to_cut_length, &to_part, &to_whole})
+        for (Rescale* r :
+             {&to_way_between, &to_between, &even.to_row, &to_depth_share, &to_share,  &to_square, &to_moment,
+              &to_place,       &to_way,     &to_along,    &to_ahead,       &to_behind, &to_parts,  &to_shift,
+              &to_color,       &to_white,   &to_scaled,   &to_cut_length,  &to_part,   &to_whole})
             v(*r);
         v(even.rows);
     }

@@ -44,7 +44,8 @@ struct Leans {
 Leans leans_at(const EvenMatter& even, const Reach& depth) {
     const auto at = [&](double x, int column) {
         const Real<double> raw{std::ldexp(std::min(x, 2 * EvenMatter::kDeepest), even.depth_fraction)};
-        return std::ldexp(HWY_NAMESPACE::even_matter(even, raw, column).v, -kShareBits);
+        return std::ldexp(HWY_NAMESPACE::even_matter<2>(even, raw)[static_cast<std::size_t>(column)].v,
+                          -kShareBits);
     };
     return {{at(depth.low, 0) - kAway, at(depth.high, 0) + kAway},
             {at(depth.high, 1) - kAway, at(depth.low, 1) + kAway}};

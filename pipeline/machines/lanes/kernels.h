@@ -70,9 +70,10 @@ struct StageKernels {
     void (*add_ends)(const Plan&, int count, const EndGradients&, LitSamples&) = nullptr;
     /// Where light lies in packed slabs, as shading.inside asks: at one or two places, or fading.
     void (*find_light)(const Plan&, int count, const LitSamples&, SlabLight&) = nullptr;
-    /// Raw gradients on the way from one end to the other of the slabs `from`.
-    void (*lerp_ends)(const Plan&, int count, const EndGradients&, const Batch& from, const Batch& way,
-                      LitSamples&) = nullptr;
+    /// Raw gradients of the slabs `from` on the way from one end to the other: at light.way[0], to `near`, and at
+    /// light.way[1], unless `far` is null.
+    void (*lerp_ends)(const Plan&, int count, const EndGradients&, const Batch& from, const SlabLight& light,
+                      LitSamples& near, LitSamples* far) = nullptr;
     /// Joins light from two places; `far` has that of the second.
     void (*join_places)(const Plan&, int count, const SlabLight&, const LitSamples& far,
                         LitSamples&) = nullptr;
@@ -154,6 +155,7 @@ struct StageWays {
     StageWay location, interpolation, classification, compositing;
     StageWay gradient, shading;  // up to the raw gradient; normalising and light
     StageWay input;              // from sample to table entries: no narrower than interpolation
+    StageWay places, between;    // light inside a slab: its places, and gradients there
 };
 StageWays ways_of(const Plan& plan);
 

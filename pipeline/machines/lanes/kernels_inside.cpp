@@ -174,16 +174,20 @@ void add_slab_ends(const Plan& plan, int count, const lanes::EndGradients& ends,
 /// Raw gradients on the way from front to back: gradient_up_to() of the words of the buffers.
 template <class L>
 void lerp_slab_ends(const Plan& plan, int count, const lanes::EndGradients& ends, const lanes::Batch& from,
-                    const lanes::Batch& way, LitSamples& lit) {
+                    const lanes::SlabLight& light, LitSamples& near, LitSamples* far) {
     constexpr int kStep = std::max(kLanes, static_cast<int>(L::count()));
     alignas(64) Word end[2][3][kStep];
     for (int first = 0; first < count; first += kStep) {
         load_ends<kStep>(ends, from.v + first, end);
-        for (int i = 0; i < kStep; i += static_cast<int>(L::count())) {
-            const std::array<L, 3> gradient = gradient_up_to(
-                plan.inside, end_at<L>(end[0], i), end_at<L>(end[1], i), load<L>(way.v + first + i));
-            for (std::size_t a = 0; a < 3; ++a) store(gradient[a], lit.gradient[a].v + first + i);
-        }
+        const auto lerp_to = [&](const lanes::Batch& way, LitSamples& to) {
+            for (int i = 0; i < kStep; i += static_cast<int>(L::count())) {
+                const std::array<L, 3> gradient = gradient_up_to(
+                    plan.inside, end_at<L>(end[0], i), end_at<L>(end[1], i), load<L>(way.v + first + i));
+                for (std::size_t a = 0; a < 3; ++a) store(gradient[a], to.gradient[a].v + first + i);
+            }
+        };
+        lerp_to(light.way[0], near);
+        if (far) lerp_to(light.way[1], *far);
     }
 }
 
@@ -258,12 +262,12 @@ void inside_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::St
     kernels.pick_by_cuts = &pick_by_cuts;
     lanes::with_word<Lanes, kNothing>(ways.location,
                                       [&]<class L>() { kernels.place_between = &place_between<L>; });
-    lanes::with_word<Lanes, kNothing>(ways.classification, [&]<class L>() {
-        kernels.cut = &cut_sixteen<L>;
-        if (lights_at_places(plan.inside.rule)) kernels.find_light = &find_places<L>;
-    });
-    lanes::with_word<Lanes, kNothing>(ways.gradient,
-                                      [&]<class L>() { kernels.lerp_ends = &lerp_slab_ends<L>; });
+    lanes::with_word<Lanes, kNothing>(ways.classification, [&]<class L>() { kernels.cut = &cut_sixteen<L>; });
+    if (lights_at_places(plan.inside.rule))
+        lanes::with_word<Lanes, KnownRescales::halves_to_even>(
+            ways.places, [&]<class L>() { kernels.find_light = &find_places<L>; });
+    lanes::with_word<Lanes, KnownRescales::halves_to_even>(
+        ways.between, [&]<class L>() { kernels.lerp_ends = &lerp_slab_ends<L>; });
     lanes::with_word<Lanes, kNothing>(ways.shading, [&]<class L>() {
         kernels.join_places = &join_slab_places<L>;
         kernels.find_cuts = &find_cuts<L>;

@@ -166,7 +166,7 @@ StageWays ways_of(const Plan& plan) {
     StageWays ways;
     if (plan.float32) {
         for (StageWay* way : {&ways.location, &ways.interpolation, &ways.classification, &ways.compositing,
-                              &ways.gradient, &ways.shading, &ways.input})
+                              &ways.gradient, &ways.shading, &ways.input, &ways.places, &ways.between})
             way->is_float = true;
         return ways;
     }
@@ -179,6 +179,9 @@ StageWays ways_of(const Plan& plan) {
     const KnownRescales lit = known_of(plan.gradient, plan.shading);
     ways.gradient = {bits_of(plan.gradient_needs), lit};
     ways.shading = {std::max(bits_of(plan.normal_needs), bits(4)), lit};
+    const KnownRescales inside = known_of(plan.inside);
+    ways.places = {ways.classification.bits, std::min(inside, ways.classification.known)};
+    ways.between = {ways.gradient.bits, inside};
     ways.compositing = {bits(5), known_of(plan.compositing)};
     return ways;
 }

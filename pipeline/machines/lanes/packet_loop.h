@@ -323,14 +323,12 @@ class PacketLoop {
     void light_between_ends(int count, LitSamples& lit) {
         SlabLight& light = w_.slab_light;
         LitSamples& far = w_.picked;
-        const auto find_normals_at = [&](const Batch& way, LitSamples& to) {
-            kernels_.lerp_ends(plan_, count, w_.end_gradients, lit.from, way, to);
-            kernels_.find_normals(plan_, count, to);
-        };
+        const bool one_place = plan_.inside.rule == InsideRule::centroid;
         kernels_.find_light(plan_, count, lit, light);
-        find_normals_at(light.way[0], lit);
-        if (plan_.inside.rule == InsideRule::centroid) return kernels_.shade(plan_, count, lit);
-        find_normals_at(light.way[1], far);
+        kernels_.lerp_ends(plan_, count, w_.end_gradients, lit.from, light, lit, one_place ? nullptr : &far);
+        if (one_place) return shade(count, lit);
+        kernels_.find_normals(plan_, count, lit);
+        kernels_.find_normals(plan_, count, far);
         if (lights_fade(plan_.inside.rule)) return kernels_.shade_fading(plan_, count, light, far, lit);
         far.alpha = lit.alpha;
         std::copy_n(lit.color, 3, far.color);

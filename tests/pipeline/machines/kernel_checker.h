@@ -204,7 +204,7 @@ class KernelChecker {
                 [this] { return light_difference(); });
             add(
                 "lerp_ends", [this] { draw_ends(), draw_ways(); },
-                [this] { kernels_.lerp_ends(plan_, count_, ends_, lit_->from, light_->way[1], *lit_); },
+                [this] { kernels_.lerp_ends(plan_, count_, ends_, lit_->from, *light_, *lit_, &*far_); },
                 [this] { return lerp_difference(); });
             if (lights_fade(plan_.inside.rule))
                 add(
@@ -377,7 +377,7 @@ class KernelChecker {
     }
     void draw_ways() {
         for (int i = 0; i < kBatch; ++i) {
-            light_->way[1].v[i] = static_cast<Word>(up_to(one(kWayBits)));
+            for (lanes::Batch& way : light_->way) way.v[i] = static_cast<Word>(up_to(one(kWayBits)));
             light_->share.v[i] = static_cast<Word>(up_to(one(kShareBits)));
         }
     }
@@ -690,9 +690,13 @@ class KernelChecker {
                 const Word* at = ends_.component[a].v + lit_->from.v[i];
                 front[a] = at[0], back[a] = at[kRays];
             }
-            const L3 model = gradient_up_to(plan_.inside, front, back, Integer{light_->way[1].v[i]});
-            return first_of(3, [&](int a) {
-                return differs("gradient", i, model[static_cast<std::size_t>(a)], lit_->gradient[a].v[i]);
+            return first_of(2, [&](int place) {
+                const Word way = light_->way[static_cast<std::size_t>(place)].v[i];
+                const L3 model = gradient_up_to(plan_.inside, front, back, Integer{way});
+                const lanes::LitSamples& there = place == 0 ? *lit_ : *far_;
+                return first_of(3, [&](int a) {
+                    return differs("gradient", i, model[static_cast<std::size_t>(a)], there.gradient[a].v[i]);
+                });
             });
         });
     }
