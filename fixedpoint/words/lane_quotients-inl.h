@@ -8,6 +8,7 @@
 #endif
 
 #include "fixedpoint/quotients-inl.h"
+#include "fixedpoint/split_quotient.h"
 #include "fixedpoint/words/lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -125,8 +126,8 @@ inline constexpr bool kRoundsOnce = true;
 inline constexpr bool kRoundsOnce = false;
 #endif
 /// scaled / denominator as whole doubles, from the denominator's inverse.  An estimate, off by an eighth at most where
-/// results have 48 bits, is corrected by its exact remainder.  Without multiply-adds that round once, one half of the
-/// estimate times the denominator has at most 53 bits (range.cpp notes it).
+/// results have 48 bits, is corrected by its exact remainder.  Without multiply-adds that round once, its products
+/// have at most 53 bits (split_quotient.h; range.cpp notes it).
 template <class V>
 HWY_INLINE V whole_quotient(V scaled, V below, V inverse, const Rescale& to) {
     const hn::ScalableTag<double> d;
@@ -140,6 +141,11 @@ HWY_INLINE V whole_quotient(V scaled, V below, V inverse, const Rescale& to) {
     auto rest = zero;
     if constexpr (kRoundsOnce) {
         rest = hn::NegMulAdd(q, below, scaled);
+    } else if (splits_denominator(to.width)) {
+        const hn::ScalableTag<std::int64_t> bits;
+        const auto high =
+            hn::BitCast(d, hn::And(hn::BitCast(bits, below), hn::Set(bits, -(std::int64_t{1} << 26))));
+        rest = hn::Sub(hn::Sub(scaled, hn::Mul(q, high)), hn::Mul(q, hn::Sub(below, high)));
     } else {
         const auto coarse = hn::Mul(hn::Trunc(hn::Mul(q, hn::Set(d, power_of_two<double>(-to.width / 2)))),
                                     hn::Set(d, power_of_two<double>(to.width / 2)));

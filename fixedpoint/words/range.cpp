@@ -1,6 +1,8 @@
 // Interval arithmetic: it proves how wide the exact results of a stage are.
 #include "fixedpoint/words/range.h"
 
+#include "fixedpoint/split_quotient.h"
+
 namespace squint {
 
 thread_local WordNeeds Range::needs;
@@ -224,8 +226,8 @@ Range quotient(WideRange numerator, WideRange denominator, const Rescale& to) {
     const int lanes_before = Range::needs.lane_bits;
     const Range q = quotient(numerator.range, denominator.range, to);
     Range::needs.lane_bits = std::max(lanes_before, to.wraps || to.width > 31 ? 65 : 0);
-    // The product of one half of a result with the denominator.
-    noted_as_wide(0, product(std::max<Int128>(denominator.range.high, 1), Int128{1} << (to.width / 2 + 2)));
+    noted_as_wide(0, product(std::max<Int128>(denominator.range.high, 1),
+                             Int128{1} << bits_beside_denominator(to.width)));
     return q;
 }
 

@@ -181,7 +181,7 @@ void compare_wide(Comparison<T>& compare) {
     spec.overflow = Overflow::sat;
     spec.format = {static_cast<int>(compare.between(1, 6)), static_cast<int>(compare.between(0, 16)), false};
     const int gained = static_cast<int>(compare.between(0, 10)),
-              bits = static_cast<int>(compare.between(0, 8));
+              bits = static_cast<int>(compare.between(0, 16));
     const Rescale to(spec.format.fraction_bits - gained, spec);
     // Small denominators are met by many ties.
     const int most = compare.between(0, 1) ? 30 : 4;
@@ -195,6 +195,36 @@ void compare_wide(Comparison<T>& compare) {
         "product over wide to " + to_string(spec),
         [&](int i) { return i == 2 ? 1 + compare.any(most - 1, false) : compare.any(20); },
         [&](auto x, auto y, auto z) { return quotient(absolute(wide_product(x, y)), widen(z), to); });
+}
+
+/// Wide quotients at a tie, or off it by less than 2^-45: a remainder that is not exact falls on the wrong side.
+template <class T>
+void compare_wide_ties(Comparison<T>& compare) {
+    constexpr int kBits = 16;
+    const int gained = static_cast<int>(compare.between(1, 15));
+    const Rescale to(
+        0, {{1, gained, false}, compare.between(0, 1) ? Rounding::rnd : Rounding::rnd_conv, Overflow::sat});
+    const std::int64_t parts = std::int64_t{2} << gained;
+    std::vector<std::array<std::int64_t, 3>> drawn;
+    std::size_t next[3] = {0, 0, 0};
+    compare(
+        "wide ties to " + to_string(Format{1, gained, false}),
+        [&](int operand) {
+            if (operand == 0) {
+                // `parts` N = odd D + off, D = z (2^16 + 1): z is the class of numbers for which N is whole.
+                const std::int64_t odd = 2 * compare.between(0, parts / 2 - 1) + 1,
+                                   off = compare.between(-3, 3);
+                std::int64_t inverse = odd;
+                for (int i = 0; i < 4; ++i) inverse = inverse * (2 - odd * inverse) & (parts - 1);
+                const std::int64_t z = (compare.between(1 << 29, (1 << 30) - 1) & -parts) |
+                                       (-off * inverse & (parts - 1)),
+                                   n = (odd * (z * ((1 << kBits) + 1)) + off) / parts;
+                drawn.push_back({n >> kBits, n & ((1 << kBits) - 1), z});
+            }
+            const auto at = static_cast<std::size_t>(operand);
+            return drawn[next[at]++][at];
+        },
+        [&](auto x, auto y, auto z) { return quotient(wide_sum(x, kBits, y), wide_sum(z, kBits, z), to); });
 }
 
 /// Numbers from 0 to 1 of 15 fraction bits, both ends included; half of them of few significant bits, whose
@@ -332,7 +362,7 @@ void compare_words(std::vector<std::string>& wrong) {
         for (int c = 0; c < 3; ++c) table.set_raw(i, c, compare.any(31));
     for (int round = 0; round < 4000 && wrong.size() < 4; ++round) {
         compare_arithmetic(compare), compare_quantise(compare), compare_quotients(compare);
-        compare_tables(compare, table), compare_wide(compare);
+        compare_tables(compare, table), compare_wide(compare), compare_wide_ties(compare);
         compare_quantise(known_even), compare_quantise(known_up);
     }
     for (int round = 0; round < 4000 && wrong.size() < 4; ++round) {

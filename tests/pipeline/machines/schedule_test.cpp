@@ -114,6 +114,18 @@ TEST(Schedule, SecondLooksKeepTheCompositingOfUnits) {
     EXPECT_THAT(schedule.name, HasSubstr("composite.unit15"));
 }
 
+// Places of light divide depths of a whole function by each other; they ask for no wide lanes.
+TEST(Schedule, PlacesOfLightKeepTheLanesOfSlabsThatAreNotLit) {
+    const auto bits = [](const char* model) {
+        return ways_of(plan_with({std::string("shading.model=") + model, "shading.inside=two_point",
+                                  "classification.method=pips",
+                                  "transfer_function.points=[[0,1,1,1,0],[1000,1,1,1,0.9],[2000,1,1,1,1]]"}))
+            .classification.bits;
+    };
+    EXPECT_EQ(bits("none"), 32);
+    EXPECT_EQ(bits("blinn_phong"), 32);
+}
+
 TEST(Schedule, SaysWhichKernelItMissesAndWhy) {
     if (!has_vectors()) GTEST_SKIP();
     EXPECT_THAT(schedule_with({"shading.model=none"}, false).missed,
