@@ -40,25 +40,25 @@ struct Case {
     double step;
 };
 
-/// Makes plan and picture, and adds their times.
-Rendering timed(const Scene& scene, const std::shared_ptr<const Volume>& volume, int frame, int threads,
-                Times& times) {
+/// Makes plan and picture, in the memory of the picture before as VTK does, and adds their times.
+void timed(const Scene& scene, const std::shared_ptr<const Volume>& volume, int frame, int threads,
+           Times& times, Rendering& rendering) {
     const Stopwatch watch;
     const double before = processor_ms();
     const Plan plan = make_plan(scene, volume, frame);
     RenderOptions options;
     options.threads = threads;
-    Rendering rendering = render(plan, options);
+    render(plan, options, rendering);
     times.whole.push_back(watch.ms());
     times.processor.push_back(processor_ms() - before);
     times.cast.push_back(1000 * rendering.statistics.seconds);
-    return rendering;
 }
 
 double first_frame_of_ours(const Scene& scene, const Volume& volume, int threads) {
     const auto copy = fresh_copy(volume);
     Times times;
-    timed(scene, copy, 0, threads, times);
+    Rendering rendering;
+    timed(scene, copy, 0, threads, times, rendering);
     return times.whole[0];
 }
 
@@ -101,6 +101,7 @@ Json compare_case(const Case& c, const Settings& settings) {
         const double vtk_first = first_frame_of_vtk(plan, plan.camera, n);
         Times vtk;
         std::vector<Contender> ours = contenders;
+        std::vector<Rendering> pictures(ours.size());
         Json errors = Json::object();
         std::vector<Json> details(ours.size());
         peer.set_threads(n);
@@ -120,8 +121,9 @@ Json compare_case(const Case& c, const Settings& settings) {
             for (std::size_t i = 0; i < ours.size(); ++i) {
                 const Scene changed = scene_of(c, ours[i].overrides, settings);
                 Times not_counted;  // what is built once
-                if (frame == 0) timed(changed, volume, frame, n, not_counted);
-                const Rendering mine = timed(changed, volume, frame, n, ours[i].one_run);
+                Rendering& mine = pictures[i];
+                if (frame == 0) timed(changed, volume, frame, n, not_counted, mine);
+                timed(changed, volume, frame, n, ours[i].one_run, mine);
                 if (frame > 0) continue;
                 const Image part = thinned(mine.image, every);
                 const Plan own = make_plan(changed, volume);
