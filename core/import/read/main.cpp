@@ -22,6 +22,15 @@ namespace {
 constexpr rlim_t kParserBytes = rlim_t{2} << 30;
 constexpr rlim_t kOpenFiles = 64;
 
+// The address sanitizer takes memory of its own, more than that.
+#if defined(__SANITIZE_ADDRESS__)
+constexpr bool kLimitsMemory = false;
+#elif defined(__has_feature)
+constexpr bool kLimitsMemory = !__has_feature(address_sanitizer);
+#else
+constexpr bool kLimitsMemory = true;
+#endif
+
 void limit(__rlimit_resource what, rlim_t most) {
     const rlimit limits{most, most};
     setrlimit(what, &limits);
@@ -33,7 +42,7 @@ void limit_all(const LoadLimits& limits, rlim_t seconds) {
         static_cast<rlim_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<rlim_t>(sysconf(_SC_PAGESIZE));
     const rlim_t voxels = std::min(machine, static_cast<rlim_t>(limits.max_bytes)) + kPaddingBytes;
     limit(RLIMIT_CPU, seconds);
-    limit(RLIMIT_DATA, kParserBytes);
+    if (kLimitsMemory) limit(RLIMIT_DATA, kParserBytes);
     limit(RLIMIT_FSIZE, voxels);
     limit(RLIMIT_NOFILE, kOpenFiles);
     limit(RLIMIT_CORE, 0);
