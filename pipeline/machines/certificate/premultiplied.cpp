@@ -131,7 +131,7 @@ class ByEnds {
     const SlabEnds& s_;
     const Bounded &front_, &back_, &length_;
 };
-/// Of doubles.
+/// An error, of which nothing is left where doubles cannot tell it from their own.
 double told(double x) {
     return std::abs(x) < 0x1p-44 ? 0 : std::abs(x);
 }

@@ -1,5 +1,5 @@
-// What packed samples are made by and read by: the wanted lanes of several vectors side by side.  Compiled once per
-// SIMD target.
+// How packed samples are made, the wanted lanes of several vectors side by side, and how they are read.
+// Compiled once per SIMD target.
 #if defined(SQUINT_PIPELINE_MACHINES_LANES_PACKING_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef SQUINT_PIPELINE_MACHINES_LANES_PACKING_INL_H
 #undef SQUINT_PIPELINE_MACHINES_LANES_PACKING_INL_H

@@ -14,8 +14,8 @@
 //     alpha'                              >=  mean of  alpha(tau(y)) - what rows take of it at y
 //
 // (X dK = int (c - K) dtau + int tau dc, alpha <= X; 1 - exp(-x) is concave).  Both are means over one way, so a_i -
-// alpha_i v is at most its greatest over all inputs on it: the same h, of all values that a cell and those a step away
-// hold.
+// alpha_i v is at most its greatest over all inputs on it: the same h, of all values
+// that a cell and those a step away hold.
 //
 // Rows.  T and X rise at known rates, exactly straight between rows (T's bend apart), so a short way is off by no more than a
 // long one: by the rates' own errors, and in colour by what rows cannot tell.  With Q_r, S_r a way's parts of depth in row
