@@ -116,8 +116,8 @@ void render(const Plan& plan, const RenderOptions& options, Rendering& into) {
     if (!fast && options.skip) model.skip_empty_space(lanes::room_of(options));
     statistics.path = fast ? "lanes" : "model";
     statistics.target = fast ? fast->target() : "";
-    statistics.why =
-        fast ? fast->why() : model.why() + (obstacle && (!plan.real || plan.float32) ? ": " + *obstacle : "");
+    if (!fast)
+        statistics.why = model.why() + (obstacle && (!plan.real || plan.float32) ? ": " + *obstacle : "");
     statistics.layout = fast ? fast->layout() : "linear";
     statistics.setup_seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - setup_start).count();
@@ -146,7 +146,7 @@ void render(const Plan& plan, const RenderOptions& options, Rendering& into) {
     });
     if (stopped) throw Cancelled{};
     statistics.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    statistics.bytes = fast ? fast->bytes() : 0;
+    if (fast) statistics.why = fast->why(), statistics.bytes = fast->bytes();
     for (const TileStatistics& t : per_tile) {
         statistics.rays += t.rays, statistics.samples += t.samples, statistics.visited += t.visited;
         statistics.refined.add(t.refined);

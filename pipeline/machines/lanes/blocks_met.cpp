@@ -1,5 +1,6 @@
 #include "pipeline/machines/lanes/blocks_met.h"
 
+#include "pipeline/machines/lanes/cell_blocks.h"
 #include "pipeline/machines/lanes/kept_empty_space.h"
 
 #include <unistd.h>
@@ -50,6 +51,26 @@ BlockBox blocks_met(const Plan& plan) {
         box.blocks[a] = std::max(block(high[a] + beyond), box.low[a]) - box.low[a] + 1;
     }
     return box;
+}
+
+bool may_be_met(const BlockBox& box, const EmptySpace* empty, const Index3& cell_blocks, std::int64_t block,
+                int apart) {
+    constexpr int kBits = CellBlocks::kBits - kBlockBits;
+    static_assert(kBits >= 0);
+    const Index3 at(block % cell_blocks.x, block / cell_blocks.x % cell_blocks.y,
+                    block / (cell_blocks.x * cell_blocks.y));
+    Index3 low, end;
+    for (int a = 0; a < 3; ++a) {
+        low[a] = std::max(at[a] << kBits, box.low[a]);
+        end[a] = std::min((at[a] + 1) << kBits, box.low[a] + box.blocks[a]);
+        if (low[a] >= end[a]) return false;
+    }
+    if (!empty) return true;
+    for (auto z = low.z; z < end.z; ++z)
+        for (auto y = low.y; y < end.y; ++y)
+            for (auto x = low.x; x < end.x; ++x)
+                if (empty->at(x, y, z) <= apart) return true;
+    return false;
 }
 
 bool may_skip(const Plan& plan) {

@@ -13,6 +13,11 @@ namespace squint::lanes {
 /// With a margin of a slab's reach and one more.
 BlockBox blocks_met(const Plan& plan);
 
+/// Whether rays may meet a block of CellBlocks, of so many along each axis: some block in it lies in the box and, where
+/// empty space is known, at most `apart` from something visible.
+bool may_be_met(const BlockBox& box, const EmptySpace* empty, const Index3& cell_blocks, std::int64_t block,
+                int apart);
+
 /// Whether empty space may be left out, and slabs are short enough for it to pay.
 bool may_skip(const Plan& plan);
 

@@ -12,21 +12,26 @@
 
 namespace squint::lanes {
 
+/// What a cell holds: its corners, x fastest, in the volume's own type; or, of voxels below 2^15, the central
+/// differences at them in 16 bits, those along x before those along y and z.
+enum class CellContent { corners, differences };
+
 class CellBlocks {
   public:
     static constexpr int kBits = 3;  // blocks of 8 x 8 x 8 cells, x fastest
     static constexpr int kCells = 1 << 3 * kBits;
+    static constexpr std::int64_t kDifferenceBytes = 48;  // of a cell
 
     /// Reserves `most_bytes` for cells, or enough for all.
-    CellBlocks(const Volume& volume, std::int64_t most_bytes);
+    CellBlocks(const Volume& volume, std::int64_t most_bytes, CellContent content = CellContent::corners);
     ~CellBlocks();
     CellBlocks(const CellBlocks&) = delete;
     CellBlocks& operator=(const CellBlocks&) = delete;
 
     /// The bytes of all cells of a volume.
-    static std::int64_t bytes_of_all(const Volume& volume);
+    static std::int64_t bytes_of_all(const Volume& volume, CellContent content = CellContent::corners);
     /// The bytes of the tables that say where blocks lie.
-    static std::int64_t table_bytes_of(const Volume& volume);
+    static std::int64_t table_bytes_of(const Volume& volume, CellContent content = CellContent::corners);
 
     /// Builds the blocks that wanted(block) accepts and that are missing, while there is room.
     void build(const std::function<bool(std::int64_t)>& wanted);
@@ -40,9 +45,8 @@ class CellBlocks {
         std::int32_t start[8];
     };
     static constexpr std::int32_t kNotThere = -0x40000000;  // stays below zero for all cells
-    /// For each block and those after it; null where blocks are too many.
+    /// For each block and those after it; null where blocks are too many, and of differences.
     std::shared_ptr<const std::vector<Near>> near() const;
-    /// Corners x fastest, in the volume's own type.
     const std::uint8_t* data() const { return data_; }
     Index3 blocks() const { return blocks_; }
     /// Blocks built so far, and those there is room for.
@@ -51,10 +55,15 @@ class CellBlocks {
 
   private:
     template <class T>
-    void fill(std::int64_t index, T* cells) const;
+    void fill(std::int64_t index, std::uint8_t* cells) const;
+    template <class T>
+    void fill_corners(const Index3& low, T* cells) const;
+    template <class T>
+    void fill_differences(const Index3& low, std::uint8_t* cells) const;
     void find_near();
 
     const Volume volume_;
+    const CellContent content_;
     Index3 blocks_{0, 0, 0};
     std::int64_t block_bytes_ = 0, room_ = 0;  // room_ in blocks
     std::uint8_t* data_ = nullptr;             // reserved; the system adds pages as they are written
@@ -66,6 +75,7 @@ class CellBlocks {
 
 /// The cells of a volume, cached while its voxels live.  A later call may ask for other room: `strictly` for
 /// no more than it says, otherwise for about as much.
-std::shared_ptr<CellBlocks> cell_blocks(const Volume& volume, std::int64_t most_bytes, bool strictly);
+std::shared_ptr<CellBlocks> cell_blocks(const Volume& volume, std::int64_t most_bytes, bool strictly,
+                                        CellContent content = CellContent::corners);
 
 }  // namespace squint::lanes

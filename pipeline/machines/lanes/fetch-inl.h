@@ -36,9 +36,11 @@ class CellPlaces {
 
   public:
     HWY_INLINE explicit CellPlaces(const lanes::VoxelSource& source)
-        : slots_(source.slots.data()),
-          row_(static_cast<lanes::Word>(source.blocks.x)),
-          slice_(static_cast<lanes::Word>(source.blocks.x * source.blocks.y)) {}
+        : CellPlaces(source.slots.data(), source.blocks) {}
+    HWY_INLINE CellPlaces(const std::int32_t* slots, const Index3& blocks)
+        : slots_(slots),
+          row_(static_cast<lanes::Word>(blocks.x)),
+          slice_(static_cast<lanes::Word>(blocks.x * blocks.y)) {}
 
     /// Of cells (x, y, z): among all cells, or -1 where there is none.
     HWY_INLINE Words operator()(Words x, Words y, Words z) const {

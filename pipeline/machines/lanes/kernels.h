@@ -5,6 +5,7 @@
 #include "core/image.h"
 #include "pipeline/machines/lanes/cell_blocks.h"
 #include "pipeline/machines/lanes/empty_space.h"
+#include "pipeline/machines/lanes/lit_cells.h"
 #include "pipeline/machines/lanes/near_walls.h"
 #include "pipeline/machines/lanes/packet.h"
 #include "pipeline/machines/lanes/schedule.h"
@@ -27,6 +28,7 @@ struct VoxelSource {
     // A packet's rays lie so far apart that each asks memory for its own voxels.
     bool requests_all = false;
     std::shared_ptr<const std::vector<CellBlocks::Near>> near;  // may be null
+    const LitCells* lit = nullptr;  // perhaps still to be built; null: differences come from voxels
 };
 
 struct StageKernels {
@@ -103,6 +105,9 @@ struct StageKernels {
     void (*place_samples_between)(const Plan&, const LitSamples& slabs, int at, int bits, Samples&) = nullptr;
     /// Loads the voxels around the first `count` packed samples, as many as the gradient rule needs.
     void (*fetch_lit)(const Plan&, const VoxelSource&, int count, LitSamples&) = nullptr;
+    /// In place of fetch_lit, where no_differences is empty: central differences, of lit cells where they are built.
+    void (*fetch_differences)(const Plan&, const VoxelSource&, int count, LitSamples&) = nullptr;
+    std::string no_differences;  // why gradients are taken from voxels
     /// In place of fetch_lit, for gradients from samples: rows [0, rows) of 16 packed samples each get the
     /// cells and weights one voxel further along an axis.
     void (*step_aside)(const Plan&, const LitSamples&, int axis, bool ahead, int rows, Samples&) = nullptr;

@@ -18,9 +18,8 @@ HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 namespace {
 
-/// A neighbourhood whose voxels are loaded as they are asked for.  kNarrow: differences and weights fit 16 bits,
-/// for voxels lie below 2^15 and the stage is DefaultGradient's.
-template <class L, bool kNarrow>
+/// A neighbourhood whose voxels are loaded as they are asked for.
+template <class L>
 struct StoredNeighbourhood {
     const lanes::Batch* pair;
     int place;
@@ -29,34 +28,28 @@ struct StoredNeighbourhood {
         if (cross && lanes::is_outer_row(y, z)) return half_of(words(0, y, z), x == 2);
         return half_of(words(x / 2, y, z), x % 2 != 0);
     }
-    /// Neighbourhood's; narrow ones two differences a word.
-    HWY_INLINE L along_x(const GradientStage& s, int y, int z, int axis, L weight) const {
-#if HWY_TARGET != HWY_SCALAR
-        if constexpr (kNarrow) {
-            const hn::ScalableTag<std::int32_t> d;
-            const hn::ScalableTag<std::int16_t> d16;
-            const auto ahead = axis == 0 ? words(1, y, z).v : axis == 1 ? middle(y + 1, z) : middle(y, z + 1);
-            const auto behind = axis == 0   ? words(0, y, z).v
-                                : axis == 1 ? middle(y - 1, z)
-                                            : middle(y, z - 1);
-            const auto differences =
-                hn::BitCast(d, hn::Sub(hn::BitCast(d16, ahead), hn::BitCast(d16, behind)));
-            return blend_pairs<L::kKnown>(differences, pair_weights(weight.v, s.weight_bits), 0, s.to_first);
-        }
-#endif
+    L along_x(const GradientStage& s, int y, int z, int axis, L weight) const {
         return lerped_difference(s, *this, y, z, axis, weight);
     }
 
   private:
-    HWY_INLINE L words(int x, int y, int z) const {
-        return load<L>(pair[(z * 4 + y) * 2 + x].v + place);
-    }
-    /// The middle two of a row's four voxels, of a cross.
-    HWY_INLINE auto middle(int y, int z) const {
-        if (lanes::is_outer_row(y, z)) return words(0, y, z).v;
-        return inner_pair(words(0, y, z).v, words(1, y, z).v);
+    HWY_INLINE L words(int x, int y, int z) const { return load<L>(pair[(z * 4 + y) * 2 + x].v + place); }
+};
+
+#if HWY_TARGET != HWY_SCALAR
+/// A neighbourhood whose central differences fit 16 bits, as its weights do, for the stage is DefaultGradient's: two
+/// a word.
+template <class L>
+struct StoredDifferences {
+    const lanes::Batch (&difference)[3][4];
+    int place;
+    HWY_INLINE L along_x(const GradientStage& s, int y, int z, int axis, L weight) const {
+        const hn::ScalableTag<std::int32_t> d;
+        const auto both = hn::Load(d, difference[axis][2 * (z - 1) + y - 1].v + place);
+        return blend_pairs<L::kKnown>(both, pair_weights(weight.v, s.weight_bits), 0, s.to_first);
     }
 };
+#endif
 
 /// F: what is known of the stage.
 template <class L, class F>
@@ -69,8 +62,17 @@ HWY_INLINE std::array<L, 3> stored_gradient(const GradientStage& s, const lanes:
         };
         return {between(0), between(1), between(2)};
     }
-    const StoredNeighbourhood<L, !F::kNone> near{lit.pair, at, s.rule == GradientRule::central};
     const std::array<L, 3> weight = load_three<L>(lit.weight, at);
+#if HWY_TARGET != HWY_SCALAR
+    if constexpr (!F::kNone) {
+        const StoredDifferences<L> near{lit.difference, at};
+        const auto along = [&](int axis) SQUINT_WRITTEN_OUT {
+            return to_world(s, interpolated_difference(s, near, weight, axis), axis);
+        };
+        return {along(0), along(1), along(2)};
+    }
+#endif
+    const StoredNeighbourhood<L> near{lit.pair, at, s.rule == GradientRule::central};
     const auto along = [&](int axis) SQUINT_WRITTEN_OUT {
         return to_world(s, voxel_difference(s, near, weight, axis), axis);
     };
@@ -108,16 +110,21 @@ void find_normals(const Plan& plan, int count, lanes::LitSamples& lit) {
 void gradient_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::StageKernels& kernels) {
     using NoGradient = NoFacts<GradientStage>;
     constexpr KnownRescales kEven = KnownRescales::halves_to_even;
-    const bool narrow = narrow_gradients_missing(plan.volume->largest, plan.gradient).empty();
+    const std::string missing = narrow_gradients_missing(plan.volume->largest, plan.gradient);
+    kernels.no_differences = missing.empty() ? lanes::why_not_narrow(ways.gradient, kEven) : missing;
+    if constexpr (HWY_TARGET == HWY_SCALAR) kernels.no_differences = "lanes are single";
+    const bool narrow = kernels.no_differences.empty();
     lanes::with_word<Lanes, kEven>(ways.gradient, [&]<class G>() {
         kernels.find_gradients = &find_gradients<G, NoGradient>;
         if constexpr (std::is_same_v<G, Lanes<std::int32_t, kEven>>)
-            if (narrow) kernels.find_gradients = &find_gradients<G, DefaultGradient>;
+            if (narrow)
+                kernels.find_gradients = &find_gradients<G, DefaultGradient>,
+                kernels.fetch_lit = kernels.fetch_differences;
     });
     lanes::with_word<Lanes, kEven>(ways.shading, [&]<class L>() {
         kernels.find_normals = &find_normals<L, NoGradient>;
         if constexpr (std::is_same_v<L, Lanes<std::int32_t, kEven>>)
-            if (narrow) kernels.find_normals = &find_normals<L, DefaultGradient>;
+            if (missing.empty()) kernels.find_normals = &find_normals<L, DefaultGradient>;
     });
 }
 

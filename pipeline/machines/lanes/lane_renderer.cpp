@@ -48,27 +48,6 @@ KnownRescales known_of(Stage... stage) {
     return all.known;
 }
 
-// Whether rays may meet a block of cells.  Rays that skip empty space still run through what lies within a
-// batch of something visible.
-bool may_be_met(const BlockBox& box, const EmptySpace* empty, const Index3& cell_blocks, std::int64_t block) {
-    constexpr int kBits = CellBlocks::kBits - kBlockBits;
-    static_assert(kBits >= 0);
-    const Index3 at(block % cell_blocks.x, block / cell_blocks.x % cell_blocks.y,
-                    block / (cell_blocks.x * cell_blocks.y));
-    Index3 low, end;
-    for (int a = 0; a < 3; ++a) {
-        low[a] = std::max(at[a] << kBits, box.low[a]);
-        end[a] = std::min((at[a] + 1) << kBits, box.low[a] + box.blocks[a]);
-        if (low[a] >= end[a]) return false;
-    }
-    if (!empty) return true;
-    for (auto z = low.z; z < end.z; ++z)
-        for (auto y = low.y; y < end.y; ++y)
-            for (auto x = low.x; x < end.x; ++x)
-                if (empty->at(x, y, z) <= kSteps >> kBlockBits) return true;
-    return false;
-}
-
 double samples_of(const Plan& plan) {
     const Index3& n = plan.volume->dims;
     return static_cast<double>(plan.camera.width) * plan.camera.height *
@@ -128,8 +107,10 @@ void build_cells(const std::shared_ptr<CellBlocks>& cells, const Volume& volume,
     kept.find_or_make(
         volume,
         [&] {
-            cells->build(
-                [&](std::int64_t block) { return may_be_met(box, empty.get(), cells->blocks(), block); });
+            // Rays that skip empty space still run through what lies within a batch of something visible.
+            cells->build([&](std::int64_t block) {
+                return may_be_met(box, empty.get(), cells->blocks(), block, kSteps >> kBlockBits);
+            });
             return std::make_shared<Built>(Built{cells, box, empty});
         },
         [&](const Built& built) {
@@ -260,6 +241,7 @@ LaneRenderer::LaneRenderer(const Plan& plan, const RenderOptions& options)
     if (options.skip) find_empty();
     choose_layout(options);
     kernels_ = kernels_for(plan, ways_, voxels_, target_);
+    if (plan.lit && !plan.projection_mode) find_lit_cells(options);
     schedule_ = schedule_of(plan, kernels_);
     if (empty_ && !plan.projection_mode && nothing_is_black(plan))
         seen_ = visible_packets(plan, about_->surface);
@@ -301,6 +283,26 @@ void LaneRenderer::choose_layout(const RenderOptions& options) {
                           static_cast<double>(all) / 0x1p20, static_cast<double>(cells_->room()) / 0x1p20);
 }
 
+void LaneRenderer::find_lit_cells(const RenderOptions& options) {
+    no_lit_cells_ = kernels_.no_differences;
+    if (no_lit_cells_.empty() && !voxels_.cells) no_lit_cells_ = "the volume lies as it is";
+    if (!no_lit_cells_.empty()) return;
+    const Volume& volume = *plan_.volume;
+    constexpr auto kContent = CellContent::differences;
+    const std::int64_t taken = cells_->room() + CellBlocks::table_bytes_of(volume);
+    // Their slots lie there twice.
+    const std::int64_t room = room_ - taken - 2 * CellBlocks::table_bytes_of(volume, kContent);
+    const std::shared_ptr<CellBlocks> cells =
+        cell_blocks(volume, std::max<std::int64_t>(room, 0), options.layout_bytes >= 0, kContent);
+    if (cells->room() == 0) {
+        no_lit_cells_ = "there is no room for them";
+        return;
+    }
+    lit_cells_ = lit_cells(volume, blocks_met(plan_), empty_, cells);
+    if (options.layout == LayoutRule::cells) lit_cells_->build();
+    voxels_.lit = lit_cells_.get();
+}
+
 namespace {
 
 std::string words_of(const Plan& plan) {
@@ -329,21 +331,33 @@ std::string words_in_lanes(const Plan& plan) {
     VoxelSource source;
     source.volume = plan.volume.get();
     source.cells = cells_pay(plan) ? &kSomewhere : nullptr;
-    return words_and_schedule(plan,
-                              schedule_of(plan, kernels_for(plan, ways_of(plan), source, find_target(""))));
+    const StageKernels kernels = kernels_for(plan, ways_of(plan), source, find_target(""));
+    std::string text = words_and_schedule(plan, schedule_of(plan, kernels));
+    if (plan.lit && !plan.projection_mode)
+        text += !kernels.no_differences.empty() ? "; no lit cells: " + kernels.no_differences
+                : source.cells                  ? "; lit cells once they pay"
+                                                : "; no lit cells: the volume lies as it is";
+    return text;
 }
 
 std::string LaneRenderer::why() const {
     std::string text = words_and_schedule(plan_, schedule_);
     if (empty_)
         text += fmt::format("; {} of {} blocks visible", empty_->visible_blocks, empty_->distance.size());
+    if (!no_lit_cells_.empty()) text += fmt::format("; no lit cells: {}", no_lit_cells_);
+    if (lit_cells_)
+        text += lit_cells_->built()
+                    ? fmt::format("; lit cells of {} blocks in {:.1f} MiB", lit_cells_->wanted(),
+                                  static_cast<double>(lit_cells_->bytes()) / 0x1p20)
+                    : fmt::format("; lit cells after {} more gradients", lit_cells_->to_come());
     if (no_room_to_skip_) text += "; empty space is visited, for there is no room for its blocks";
     return text;
 }
 
 std::int64_t LaneRenderer::bytes() const {
     return (empty_ ? EmptySpace::bytes_for(empty_->box) + about_->surface.bytes() : 0) +
-           (walls_ ? NearWalls::bytes_for(walls_->box) : 0) + (cells_ ? cells_->bytes() : 0);
+           (walls_ ? NearWalls::bytes_for(walls_->box) : 0) + (cells_ ? cells_->bytes() : 0) +
+           (lit_cells_ ? lit_cells_->bytes() : 0);
 }
 
 void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& image,
@@ -357,6 +371,7 @@ void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& 
     if (walls_) w.twice = {};
     BoxSums box_sums(*plan_.volume);
     PacketLoop loop(plan_, kernels_, schedule_, voxels_, asked_, walls_.get(), &box_sums, w);
+    std::int64_t gradients = 0;
     const bool colors_alone = !plan_.projection_mode && image.channels.size() == 4;
     for (int y = top; y < bottom; y += kSide)
         for (int x = left; x < right; x += kSide) {
@@ -380,7 +395,9 @@ void LaneRenderer::render_tile(int left, int top, int right, int bottom, Image& 
                 }
             statistics.rays += w.rays.rays, statistics.visited += loop.visited();
             statistics.samples += loop.samples(), statistics.refined.add(loop.refined());
+            gradients += loop.gradients();
         }
+    if (lit_cells_) lit_cells_->add(gradients);
 }
 
 }  // namespace squint::lanes

@@ -49,6 +49,7 @@ class LaneRenderer {
   private:
     void find_empty();
     void choose_layout(const RenderOptions& options);
+    void find_lit_cells(const RenderOptions& options);
 
     const Plan& plan_;
     std::int64_t target_;
@@ -62,6 +63,8 @@ class LaneRenderer {
     ScreenMask seen_;
     CountSlabs count_slabs_;
     std::shared_ptr<CellBlocks> cells_;
+    std::shared_ptr<LitCells> lit_cells_;
+    std::string no_lit_cells_;  // why a lit plan has none
     bool no_room_to_skip_ = false;
     std::int64_t room_ = 0;  // bytes for layouts beside the volume
     VoxelSource voxels_;

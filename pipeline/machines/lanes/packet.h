@@ -86,6 +86,9 @@ struct alignas(64) LitSamples {
     // The 4x4x4 voxels around its cell, in pairs along x.  Central differences need only the inner pair of an
     // outer row: it is stored in place of the first.
     Batch pair[32];
+    // In place of them, of voxels below 2^15: central differences at the cell's corners, by axis, in pairs along
+    // x, y fastest.
+    Batch difference[3][4];
     Batch location[2][3];  // of front and back, for gradients from samples or between ends
     Batch beside[3][2];    // scalars one voxel off along each axis: behind, ahead
     Batch half[kMostHalves][3], view[3];

@@ -98,7 +98,7 @@ class PacketLoop {
 
     /// Casts all slabs of a packet whose rays are set up.
     void run() {
-        located_ = -1, visited_ = 0, refined_ = {};
+        located_ = -1, visited_ = gradients_ = 0, refined_ = {};
         start_pixels();
         if (notes_)
             std::fill_n(w_.notes.pixel, kRays, Pixel<std::int64_t>{}),
@@ -128,7 +128,9 @@ class PacketLoop {
     }
     /// Slabs of all rays of the packet that went through the stages.
     std::int64_t visited() const { return visited_; }
-    /// And of them, those that were refined.
+    /// Gradients taken from voxels.
+    std::int64_t gradients() const { return gradients_; }
+    /// Of the slabs visited, those that were refined.
     const RefinedSlabs& refined() const { return refined_; }
 
   private:
@@ -515,7 +517,10 @@ class PacketLoop {
     // Fetches what the gradients of the first `count` packed places need: voxels, or the six samples around
     // each place.
     void look_around(int count, LitSamples& lit) {
-        if (!plan_.gradient_from_samples()) return kernels_.fetch_lit(plan_, voxels_, count, lit);
+        if (!plan_.gradient_from_samples()) {
+            gradients_ += count;
+            return kernels_.fetch_lit(plan_, voxels_, count, lit);
+        }
         const int rows = (count + kRays - 1) / kRays;
         for (int axis = 0; axis < 3; ++axis)
             for (const bool ahead : {false, true}) {
@@ -576,7 +581,7 @@ class PacketLoop {
     int current_ = 0;
     int located_ = -1;    // first slab of the batch whose locations are in the other buffer
     int last_count_ = 0;  // slabs of the last batch
-    std::int64_t visited_ = 0;
+    std::int64_t visited_ = 0, gradients_ = 0;
     RefinedSlabs refined_;
 };
 

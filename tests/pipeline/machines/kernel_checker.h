@@ -34,6 +34,7 @@ struct KernelCase {
     StageWays ways;
     std::shared_ptr<CellBlocks> cells;  // none: the volume as it lies
     VoxelSource source;
+    std::shared_ptr<LitCells> lit = nullptr;
 };
 
 /// One kernel of one case: draw() new inputs, run() it on them, and find where it differs from the model.
@@ -63,6 +64,21 @@ inline KernelCase kernel_case(const std::string& name, std::vector<std::string> 
     return c;
 }
 
+/// The same with lit cells in half of the volume.
+inline KernelCase with_lit_cells(KernelCase c) {
+    c.name += " and lit cells";
+    const Volume& volume = *c.plan.volume;
+    constexpr auto kContent = CellContent::differences;
+    BlockBox half = all_blocks_of(volume);
+    half.blocks.z = (half.blocks.z + 1) / 2;
+    c.lit = std::make_shared<LitCells>(
+        half, nullptr,
+        std::make_shared<CellBlocks>(volume, CellBlocks::bytes_of_all(volume, kContent), kContent));
+    c.lit->build();
+    c.source.lit = c.lit.get();
+    return c;
+}
+
 inline std::vector<KernelCase> kernel_cases() {
     const std::string lit = "shading.model=blinn_phong", unlit = "shading.model=none";
     const auto method = [](const char* name) { return std::string("classification.method=") + name; };
@@ -75,8 +91,14 @@ inline std::vector<KernelCase> kernel_cases() {
         add("default, from 0 to 1 at once",
             {unlit,
              "transfer_function.points=[[0, 0, 0, 1, 0.1], [900, 0, 0, 1, 0.1], [901, 1, 0, 0, 0.1]]"});
-        add("default, lit", {lit});
-        add("default, lit, 8 bits, uneven voxels", {lit, "volume.bits=8", "volume.spacing=[1, 0.7, 1.6]"});
+        for (const auto& [name, more] :
+             {std::pair{"default, lit", std::vector<std::string>{}},
+              {"default, lit, 8 bits, uneven voxels", {"volume.bits=8", "volume.spacing=[1, 0.7, 1.6]"}}}) {
+            std::vector<std::string> settings{lit};
+            settings.insert(settings.end(), more.begin(), more.end());
+            add(name, settings);
+            cases.push_back(with_lit_cells(kernel_case(name, settings, in_cells)));
+        }
         add("16 bits, sobel, perspective",
             {lit, "volume.bits=16", "shading.gradient=sobel", "camera.projection=perspective"});
         add("pips, analytic, phong, two-sided", {lit, method("pips"), "shading.gradient=analytic",

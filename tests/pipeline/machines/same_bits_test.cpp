@@ -14,6 +14,7 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <hwy/detect_targets.h>
 
 #include <algorithm>
 #include <bit>
@@ -300,19 +301,21 @@ void compare_random_scenes(unsigned usual_count, const std::string& preset) {
                    first = from_environment("SQUINT_SEED", 1);
     RenderOptions golden;
     golden.threads = 1, golden.path = Path::model, golden.skip = false;
-    unsigned drawn = 0, refused = 0, in_lanes = 0, failures = 0;
+    unsigned drawn = 0, refused = 0, in_lanes = 0, lit_cells = 0, failures = 0;
     Hasher pictures;
     std::vector<Share> kinds = shares();
     for (unsigned seed = first; seed < first + scenes; ++seed) {
         Draw draw(seed + 0x5eed);
-        const RenderOptions options = draw_options(draw);
+        RenderOptions options = draw_options(draw);
         try {
             const Case c = draw_case(seed, preset);
+            if (preset == "default" && c.plan.lit) options.layout = LayoutRule::cells;  // lit cells, too
             const Image model = render(c.plan, golden).image;
             const Rendering fast = render(c.plan, options);
             ++drawn;
             pictures.text(picture_hash(model));
             in_lanes += fast.statistics.path == "lanes";
+            lit_cells += fast.statistics.why.find("lit cells of") != std::string::npos;
             for (Share& kind : kinds)
                 if (kind.has(c.plan)) ++kind.drawn, kind.in_lanes += fast.statistics.path == "lanes";
             const std::string wrong = first_difference(model, fast.image);
@@ -334,14 +337,24 @@ void compare_random_scenes(unsigned usual_count, const std::string& preset) {
             EXPECT_GE(kind.drawn, 2u) << kind.name;
             EXPECT_GE(2 * kind.in_lanes, kind.drawn) << kind.name << ": most should run in lanes";
         }
+    const bool any_target = !std::getenv("SQUINT_TARGET") && lanes::find_target("") < HWY_EMU128;
+    if (scenes >= 200 && preset == "default" && any_target) {
+        EXPECT_GE(20 * lit_cells, scenes);
+    }
     // The model's own bits, to be compared between compilers and machines.
     std::printf("pictures %s\n", pictures.hex().c_str());
     testing::Test::RecordProperty("drawn", static_cast<int>(drawn));
     testing::Test::RecordProperty("in_lanes", static_cast<int>(in_lanes));
+    testing::Test::RecordProperty("lit_cells", static_cast<int>(lit_cells));
 }
 
 TEST(SameBits, RandomScenesHaveTheModelsBitsOnEveryPath) {
     compare_random_scenes(300, "");
+}
+
+// Default formats take the fastest kernels, and lit cells.
+TEST(SameBits, RandomScenesInDefaultFormatsHaveTheModelsBitsOnEveryPath) {
+    compare_random_scenes(200, "default");
 }
 
 // The model of float32 lanes is the scalar float.

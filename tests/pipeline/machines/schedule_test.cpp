@@ -151,6 +151,17 @@ TEST(Schedule, IsReportedWithThePictureAndWithThePlan) {
     const Schedule schedule = schedule_with({"shading.model=none"});
     EXPECT_THAT(render(plan).statistics.why, HasSubstr("schedule " + schedule.name));
     EXPECT_THAT(words_in_lanes(plan), HasSubstr("schedule " + schedule.name));
+    EXPECT_THAT(words_in_lanes(plan), Not(HasSubstr("lit cells")));
+}
+
+TEST(Schedule, APlanSaysWhyItHasNoLitCells) {
+    if (!has_vectors()) GTEST_SKIP();
+    const auto words = [](const std::vector<std::string>& settings) {
+        return words_in_lanes(plan_with(settings));
+    };
+    EXPECT_THAT(words({}), HasSubstr("; lit cells once they pay"));
+    EXPECT_THAT(words({"volume.bits=16"}), HasSubstr("; no lit cells: voxels have 16 bits"));
+    EXPECT_THAT(words({"shading.gradient=sobel"}), HasSubstr("; no lit cells: rule has another value"));
 }
 
 }  // namespace
