@@ -29,14 +29,14 @@ double last_bit(const Plan& plan, Wire wire) {
 }
 
 /// kappa and lambda of certificate.h, at their greatest.
-CompositingCosts compositing_costs(const Plan& plan) {
+CompositingCosts compositing_costs(const Plan& plan, const LightErrors& light) {
     const CompositingStage& s = plan.compositing;
     CompositingCosts costs;
     Shares& shares = costs.shares;
     const double clear = unit_of(s.to_transparency) * last_bit(plan, Wire::transparency),
                  color = unit_of(s.to_color) * last_bit(plan, Wire::color);
     shares[index_of(Wire::transparency)] = clear, shares[index_of(Wire::color)] = color;
-    costs.clear = clear;
+    costs.clear = clear, costs.most = light.brightest + light.stage;
     if (s.takes_from_transparency()) {
         // A carried remainder leaves less than a whole last bit to later slabs.
         const double unit = s.form == CompositingForm::w_carry && s.to_contribution.shift > 0
@@ -49,6 +49,9 @@ CompositingCosts compositing_costs(const Plan& plan) {
         if (s.form == CompositingForm::back_to_front)
             shares[index_of(Wire::color)] += unit_of(s.color_to_code) * last_bit(plan, Wire::color);
     }
+    // What T is off by counts with the light behind.
+    for (const Wire wire : {Wire::transparency, Wire::contribution})
+        shares[index_of(wire)] *= light.brightest;
     costs.each = shares.sum();
     return costs;
 }
@@ -192,11 +195,14 @@ class Ledger {
     Most most_of(const CellBox& cells) const {
         Most most;
         double best = 0;
-        const double v = behind_.slabs;
+        // What is charged so far: blocks cost more than the cells that a beam can meet.
+        const double v = paid_.slabs.sum();
+        const std::vector<CellValues> of = blocks_.values(cells);
+        std::size_t i = 0;
         for (std::int64_t z = cells.first[2]; z <= cells.last[2]; ++z)
             for (std::int64_t y = cells.first[1]; y <= cells.last[1]; ++y)
                 for (std::int64_t x = cells.first[0]; x <= cells.last[0]; ++x) {
-                    const CellValues values = blocks_.values(x, y, z);
+                    const CellValues& values = of[i++];
                     const SlabCosts::Decided here = costs_.decided(values, v, false);
                     if (const double net = here.cost - here.opacity * v; net > best)
                         best = net, most.slab = here, most.cell = {x, y, z};
@@ -207,13 +213,13 @@ class Ledger {
         return most;
     }
     void take(const CostBlocks::Found& found, const Most& most, bool surely) {
-        const double before = behind_.slabs;
+        const double before = behind_.slabs, charged = paid_.slabs.sum();
         beams_.step(behind_, found, surely);
         if (found.visible) {
             paid_.compositing.add(compositing_.shares, 1);
             paid_.compositing[index_of(Wire::transparency)] += compositing_.clear * before;
         }
-        if (most.last.cost > before + most.slab.cost) {
+        if (most.last.cost > charged * (1 - most.slab.opacity) + most.slab.cost) {
             paid_.slabs = {}, at_.clear();
             return charge(most.last, most.last_cell);
         }
@@ -238,7 +244,7 @@ class Ledger {
 };
 
 /// Why a bound is of no use, by its greatest payer.
-std::string why_hopeless(const SceneBound& b) {
+std::string why_hopeless(const SceneBound& b, bool lit) {
     if (b.most <= kUseful) return {};
     const std::string where =
         fmt::format("cells {} {} {} to {} {} {}, entry {:.4g}", b.block_first[0], b.block_first[1],
@@ -254,9 +260,11 @@ std::string why_hopeless(const SceneBound& b) {
                                             b.payer == index_of(Wire::classification_input));
     if (steep)
         return fmt::format(
-            "steep: steep cells meet a steep part of the function, and {} pays ({}), so nothing useful holds "
-            "for every view",
-            payer, where);
+            "steep: {}steep cells meet a steep part of the function, and {} pays ({}), so nothing useful "
+            "holds "
+            "for every view{}",
+            lit ? "weak gradients turn, or " : "", payer, where,
+            lit ? "; a greater shading.gradient_floor may help" : "");
     return fmt::format("{} pays most ({}), and nothing useful holds for every view", payer, where);
 }
 
@@ -265,12 +273,6 @@ std::string why_hopeless(const SceneBound& b) {
 std::optional<std::string> what_has_no_scene_bound(const Plan& plan) {
     if (plan.real)
         return fmt::format("precision.preset {} rounds nothing; allowed: any other preset", plan.real_name());
-    if (plan.lit)
-        return plan.scene.shading.gradient_floor > 0
-                   ? "light has no scene bound yet; allowed: shading.model none, or no lights (lights=[])"
-                   : "hopeless for a lit scene without shading.gradient_floor: in almost every block a "
-                     "gradient can vanish, "
-                     "and its normal be any; allowed: shading.model none, or no lights (lights=[])";
     const bool pips = std::holds_alternative<PowerSeriesOfOrder1>(plan.method);
     if (!pips && !std::holds_alternative<PostClassification>(plan.method))
         return fmt::format(
@@ -289,6 +291,8 @@ std::optional<std::string> what_has_no_scene_bound(const Plan& plan) {
             "compositing.form {} has no scene bound yet; allowed: w, w_carry, equation_9, alpha, "
             "back_to_front",
             name_of(form));
+    if (plan.lit)
+        if (const auto obstacle = what_light_is_not_bounded(plan)) return obstacle;
     return what_saturates(plan);
 }
 
@@ -297,23 +301,24 @@ SceneBound bound_scene(const Plan& plan, const SceneBoundOptions& options) {
     const SampleErrors errors = sample_errors(plan);
     const double range = plan.volume->largest - plan.volume->smallest;
     const CellValues steepest{0, std::max(range, 1.0), 3 * range};
-    const SlabCosts costs(plan, errors, errors.of(steepest));
-    const CompositingCosts compositing = compositing_costs(plan);
+    const LightErrors light = light_errors(plan, errors);
+    const SlabCosts costs(plan, errors, light, errors.of(steepest));
+    const CompositingCosts compositing = compositing_costs(plan, light);
     const double termination =
-        !plan.projection_mode && may_terminate(plan) ? plan.compositing.threshold_exact : 0;
+        !plan.projection_mode && may_terminate(plan) ? light.brightest * plan.compositing.threshold_exact : 0;
 
     SceneBound b;
     b.samples = static_cast<std::int64_t>(most_steps(plan)) + 1;
     tbb::task_arena arena(threads_for(options.threads));
     arena.execute([&] {
-        const CostBlocks blocks(plan, errors, costs);
+        const CostBlocks blocks(plan, errors, light, costs);
         const Beams beams(plan, errors, blocks, compositing);
         const auto in_lsb8 = [&](const Behind& behind) {
-            // Slabs come to 1 at most; the roundings of compositing may take a pixel beyond full scale.
+            // Slabs come to what matter shines at most; the roundings of compositing may take a pixel beyond full scale.
             const double sum = behind.sum() + termination;
             return 255 * (sum * (1 + 0x1p-20) + 0x1p-36);
         };
-        CellValues whole{1.0 * plan.volume->smallest, 1.0 * plan.volume->largest, blocks.steepest()};
+        const CellValues whole = blocks.whole();
         if (plan.projection_mode) {
             // An extreme, or a mean, errs by no more than the samples do: one slab of any value in the data.
             CostBlocks::Found found{costs.of(whole), costs.visible(whole)};
@@ -354,7 +359,7 @@ SceneBound bound_scene(const Plan& plan, const SceneBoundOptions& options) {
         }
         b.block_share = paid.of_block * scale, b.entry = paid.entry;
     });
-    b.hopeless = why_hopeless(b);
+    b.hopeless = why_hopeless(b, plan.lit);
     return b;
 }
 

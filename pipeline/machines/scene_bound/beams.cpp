@@ -59,7 +59,7 @@ void Beams::step(Behind& behind, const CostBlocks::Found& found, bool surely) co
     if (found.visible) behind.compositing += compositing_.each + compositing_.clear * behind.slabs;
     double slabs = surely ? behind.slabs + more : std::max(behind.slabs, behind.slabs + more);
     if (!surely) slabs = std::max(slabs, static_cast<double>(found.costs.last()));
-    behind.slabs = std::min(slabs, 1.0);
+    behind.slabs = std::min(slabs, compositing_.most);
 }
 
 std::optional<Behind> Beams::bound(const Beam& beam) const {

@@ -33,6 +33,7 @@ struct Beam {
 /// What a visible slab costs in compositing, whatever T: roundings of C, w and T.
 struct CompositingCosts {
     double each = 0;   // of 1.0
+    double most = 1;   // what slabs come to at T = 1: as much as matter shines
     double clear = 0;  // T alone: counts with what lies behind
     Shares shares;     // of `each`
 };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace squint {
 namespace {
@@ -13,8 +14,10 @@ constexpr std::int64_t kBlocksABox = 64;       // that stand for a box
 
 }  // namespace
 
-CostBlocks::CostBlocks(const Plan& plan, const SampleErrors& errors, const SlabCosts& costs)
-    : volume_(*plan.volume) {
+CostBlocks::CostBlocks(const Plan& plan, const SampleErrors& errors, const LightErrors& light,
+                       const SlabCosts& costs)
+    : volume_(*plan.volume), costs_(costs), whole_{1.0 * volume_.smallest, 1.0 * volume_.largest} {
+    if (light.lit) lights_.emplace(plan, light);
     const Vec3 low = volume_.voxel_from_grid(plan.box_low), high = volume_.voxel_from_grid(plan.box_high);
     std::array<std::int64_t, 3> size{};
     for (int axis = 0; axis < 3; ++axis) {
@@ -42,7 +45,8 @@ CostBlocks::CostBlocks(const Plan& plan, const SampleErrors& errors, const SlabC
     levels_.emplace_back();
     for (std::size_t a = 0; a < 3; ++a) levels_[0].blocks[a] = ((size[a] - 1) >> lowest_bits_) + 1;
     levels_[0].block.resize(static_cast<std::size_t>(blocks(lowest_bits_)));
-    build_lowest(costs);
+    if (lights_ && !has_one_cell()) mark_lit();
+    build_lowest();
     while (levels_.back().block.size() > 1) build_above();
 }
 
@@ -65,66 +69,54 @@ CellValues CostBlocks::of_cell(const Place& at) const {
     return cell;
 }
 
-CellValues CostBlocks::values(std::int64_t x, std::int64_t y, std::int64_t z) const {
-    const Place at{x, y, z};
-    CellValues all = of_cell(at);
-    if (within_a_step_ == Place{}) return all;
-    Place low{}, high{};
-    for (std::size_t a = 0; a < 3; ++a) {
-        low[a] = std::max<std::int64_t>(at[a] - within_a_step_[a], 0);
-        high[a] = std::min(at[a] + within_a_step_[a],
-                           std::max<std::int64_t>(volume_.dims[static_cast<int>(a)] - 2, 0));
-    }
-    for (std::int64_t k = low[2]; k <= high[2]; ++k)
-        for (std::int64_t j = low[1]; j <= high[1]; ++j)
-            for (std::int64_t i = low[0]; i <= high[0]; ++i) all.take(of_cell({i, j, k}));
-    return all;
+CostBlocks::Span CostBlocks::met(std::size_t axis) const {
+    const std::int64_t most = std::max<std::int64_t>(volume_.dims[static_cast<int>(axis)] - 2, 0);
+    return {std::max<std::int64_t>(cells_.first[axis] - within_a_step_[axis], 0),
+            std::min(cells_.last[axis] + within_a_step_[axis], most)};
 }
 
-/// values() of all cells that are rendered with this z, x fastest: axis by axis.
-std::vector<CellValues> CostBlocks::plane(std::int64_t z) const {
-    Place first{}, last{};
-    for (std::size_t a = 0; a < 3; ++a) {
-        const std::int64_t most = std::max<std::int64_t>(volume_.dims[static_cast<int>(a)] - 2, 0);
-        first[a] = std::max<std::int64_t>((a < 2 ? cells_.first[a] : z) - within_a_step_[a], 0);
-        last[a] = std::min((a < 2 ? cells_.last[a] : z) + within_a_step_[a], most);
-    }
-    const std::int64_t wide = last[0] - first[0] + 1, deep = last[1] - first[1] + 1;
-    std::vector<CellValues> along_z;
-    along_z.reserve(static_cast<std::size_t>(wide * deep));
-    for (std::int64_t y = first[1]; y <= last[1]; ++y)
-        for (std::int64_t x = first[0]; x <= last[0]; ++x) {
-            CellValues all = of_cell({x, y, first[2]});
-            for (std::int64_t k = first[2] + 1; k <= last[2]; ++k) all.take(of_cell({x, y, k}));
-            along_z.push_back(all);
-        }
-    // Each rendered place of a line that begins at `begin`, with its neighbours.
-    const auto dilate = [&](std::size_t axis, const auto& line, std::int64_t begin, std::int64_t length,
-                            std::vector<CellValues>& to) {
-        for (std::int64_t at = cells_.first[axis]; at <= cells_.last[axis]; ++at) {
-            const std::int64_t low = std::max<std::int64_t>(at - within_a_step_[axis] - begin, 0),
-                               high = std::min(at + within_a_step_[axis] - begin, length - 1);
-            CellValues all = line(low);
-            for (std::int64_t i = low + 1; i <= high; ++i) all.take(line(i));
-            to.push_back(all);
-        }
+CellValues CostBlocks::lit_cell(const Place& at) const {
+    CellValues cell = of_cell(at);
+    if (!lights_) return cell;
+    const auto is_marked = [&] {
+        const auto block = [&](std::size_t axis) { return (at[axis] - met(axis).first) >> kMarkBits; };
+        return marks_->block[marks_->index(block(0), block(1), block(2))] != 0;
     };
-    std::vector<CellValues> along_x, all;
-    for (std::int64_t y = 0; y < deep; ++y)
-        dilate(
-            0, [&](std::int64_t i) { return along_z[static_cast<std::size_t>(y * wide + i)]; }, first[0],
-            wide, along_x);
-    const std::int64_t row = cells_.last[0] - cells_.first[0] + 1;
-    std::vector<CellValues> columns;
-    for (std::int64_t x = 0; x < row; ++x)
-        dilate(
-            1, [&](std::int64_t i) { return along_x[static_cast<std::size_t>(i * row + x)]; }, first[1], deep,
-            columns);
-    const std::int64_t column = cells_.last[1] - cells_.first[1] + 1;
-    for (std::int64_t y = 0; y < column; ++y)
-        for (std::int64_t x = 0; x < row; ++x)
-            all.push_back(columns[static_cast<std::size_t>(x * column + y)]);
-    return all;
+    if (has_one_cell() ? costs_.may_cost(cell) : !marks_ || is_marked()) lights_->add_to(cell, at);
+    return cell;
+}
+
+std::vector<CellValues> CostBlocks::values(const CellBox& box) const {
+    std::array<Span, 3> from;
+    for (std::size_t a = 0; a < 3; ++a)
+        from[a] = {std::max(box.first[a] - within_a_step_[a], met(a).first),
+                   std::min(box.last[a] + within_a_step_[a], met(a).last)};
+    std::vector<CellValues> values;
+    values.reserve(static_cast<std::size_t>(from[0].size() * from[1].size() * from[2].size()));
+    for (std::int64_t z = from[2].first; z <= from[2].last; ++z)
+        for (std::int64_t y = from[1].first; y <= from[1].last; ++y)
+            for (std::int64_t x = from[0].first; x <= from[0].last; ++x)
+                values.push_back(lit_cell({x, y, z}));
+    if (has_one_cell()) return values;
+    // Each with its neighbours, axis by axis; the axis becomes the slowest, so all three are in order in the end.
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        const std::int64_t length = from[axis].size();
+        const auto lines = static_cast<std::int64_t>(values.size()) / length;
+        std::vector<CellValues> dilated;
+        dilated.reserve(static_cast<std::size_t>(lines * (box.last[axis] - box.first[axis] + 1)));
+        for (std::int64_t at = box.first[axis]; at <= box.last[axis]; ++at) {
+            const std::int64_t low = std::max(at - within_a_step_[axis] - from[axis].first, std::int64_t{0}),
+                               high = std::min(at + within_a_step_[axis] - from[axis].first, length - 1);
+            for (std::int64_t line = 0; line < lines; ++line) {
+                CellValues all = values[static_cast<std::size_t>(line * length + low)];
+                for (std::int64_t i = low + 1; i <= high; ++i)
+                    all.take(values[static_cast<std::size_t>(line * length + i)]);
+                dilated.push_back(all);
+            }
+        }
+        values = std::move(dilated);
+    }
+    return values;
 }
 
 bool CostBlocks::at_a_face(std::int64_t x, std::int64_t y, std::int64_t z) const {
@@ -136,9 +128,41 @@ bool CostBlocks::at_a_face(std::int64_t x, std::int64_t y, std::int64_t z) const
     return false;
 }
 
-void CostBlocks::build_lowest(const SlabCosts& costs) {
+/// Marks blocks of cells about all that can cost anything: light elsewhere is not looked at.
+void CostBlocks::mark_lit() {
+    const std::array<Span, 3> spans{met(0), met(1), met(2)};
+    Place blocks{};
+    for (std::size_t a = 0; a < 3; ++a) {
+        if (2 * within_a_step_[a] > std::int64_t{1} << kMarkBits) return;
+        blocks[a] = ((spans[a].size() - 1) >> kMarkBits) + 1;
+    }
+    Grid<char> marks{blocks, std::vector<char>(static_cast<std::size_t>(blocks[0] * blocks[1] * blocks[2]))};
+    Grid<char> cost = marks;
+    tbb::parallel_for(std::int64_t{0}, blocks[2], [&](std::int64_t bz) {
+        const std::int64_t z0 = spans[2].first + (bz << kMarkBits);
+        for (std::int64_t z = z0; z <= std::min(z0 + (1 << kMarkBits) - 1, spans[2].last); ++z)
+            for (std::int64_t y = spans[1].first; y <= spans[1].last; ++y)
+                for (std::int64_t x = spans[0].first; x <= spans[0].last; ++x)
+                    if (char& mark =
+                            cost.at((x - spans[0].first) >> kMarkBits, (y - spans[1].first) >> kMarkBits, bz);
+                        !mark && costs_.may_cost(of_cell({x, y, z})))
+                        mark = 1;
+    });
+    for (std::int64_t z = 0; z < blocks[2]; ++z)
+        for (std::int64_t y = 0; y < blocks[1]; ++y)
+            for (std::int64_t x = 0; x < blocks[0]; ++x)
+                for (std::int64_t i = 0; i < 27; ++i) {
+                    const std::int64_t bx = x + i % 3 - 1, by = y + i / 3 % 3 - 1, bz = z + i / 9 - 1;
+                    if (0 <= bx && bx < blocks[0] && 0 <= by && by < blocks[1] && 0 <= bz && bz < blocks[2] &&
+                        cost.at(bx, by, bz))
+                        marks.at(x, y, z) = 1;
+                }
+    marks_ = std::move(marks);
+}
+
+void CostBlocks::build_lowest() {
     Level& level = levels_[0];
-    std::vector<double> steepest(static_cast<std::size_t>(level.blocks[2]), 0.0);
+    std::vector<CellValues> steepest(static_cast<std::size_t>(level.blocks[2]), whole_);
     tbb::parallel_for(std::int64_t{0}, level.blocks[2], [&](std::int64_t bz) {
         const auto cells_of = [&](std::int64_t block, std::size_t axis) {
             const std::int64_t first = cells_.first[axis] + (block << lowest_bits_);
@@ -146,9 +170,10 @@ void CostBlocks::build_lowest(const SlabCosts& costs) {
                               std::min(first + (std::int64_t{1} << lowest_bits_) - 1, cells_.last[axis])};
         };
         const auto zs = cells_of(bz, 2);
-        const std::int64_t z0 = zs[0], z1 = zs[1], row = cells_.last[0] - cells_.first[0] + 1;
-        std::vector<std::vector<CellValues>> planes;
-        for (std::int64_t z = z0; z <= z1; ++z) planes.push_back(plane(z));
+        const std::int64_t z0 = zs[0], z1 = zs[1], row = cells_.last[0] - cells_.first[0] + 1,
+                           plane = row * (cells_.last[1] - cells_.first[1] + 1);
+        const std::vector<CellValues> cells =
+            values({{cells_.first[0], cells_.first[1], z0}, {cells_.last[0], cells_.last[1], z1}});
         for (std::int64_t by = 0; by < level.blocks[1]; ++by)
             for (std::int64_t bx = 0; bx < level.blocks[0]; ++bx) {
                 Found all;
@@ -156,12 +181,10 @@ void CostBlocks::build_lowest(const SlabCosts& costs) {
                 for (std::int64_t z = z0; z <= z1; ++z)
                     for (std::int64_t y = ys[0]; y <= ys[1]; ++y)
                         for (std::int64_t x = xs[0]; x <= xs[1]; ++x) {
-                            const CellValues& cell =
-                                planes[static_cast<std::size_t>(z - z0)][static_cast<std::size_t>(
-                                    (y - cells_.first[1]) * row + x - cells_.first[0])];
-                            double& edges = steepest[static_cast<std::size_t>(bz)];
-                            edges = std::max(edges, cell.edges);
-                            Found here{costs.of(cell), costs.visible(cell)};
+                            const CellValues& cell = cells[static_cast<std::size_t>(
+                                (z - z0) * plane + (y - cells_.first[1]) * row + x - cells_.first[0])];
+                            steepest[static_cast<std::size_t>(bz)].take(cell);
+                            Found here{costs_.of(cell), costs_.visible(cell)};
                             if (!at_a_face(x, y, z)) here.costs.at.back() = 0;
                             const bool is_first = z == z0 && y == ys[0] && x == xs[0];
                             is_first ? void(all = here) : all.take(here);
@@ -169,7 +192,7 @@ void CostBlocks::build_lowest(const SlabCosts& costs) {
                 level.block[level.index(bx, by, bz)] = all;
             }
     });
-    steepest_ = *std::max_element(steepest.begin(), steepest.end());
+    for (const CellValues& of_blocks : steepest) whole_.take(of_blocks);
 }
 
 void CostBlocks::build_above() {

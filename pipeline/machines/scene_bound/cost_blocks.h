@@ -1,10 +1,12 @@
 // Costs of slabs by place: the greatest of every block of cells, in blocks of blocks.
 #pragma once
 
+#include "pipeline/machines/scene_bound/light_errors.h"
 #include "pipeline/machines/scene_bound/slab_costs.h"
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace squint {
@@ -17,7 +19,8 @@ struct CellBox {
 class CostBlocks {
   public:
     /// Of the cells that the plan renders.  Uses the calling task arena.
-    CostBlocks(const Plan& plan, const SampleErrors& errors, const SlabCosts& costs);
+    CostBlocks(const Plan& plan, const SampleErrors& errors, const LightErrors& light,
+               const SlabCosts& costs);
 
     struct Found {
         Costs costs;
@@ -29,34 +32,50 @@ class CostBlocks {
     Found in(const CellBox& box) const;
     /// The cells that the plan renders.
     const CellBox& cells() const { return cells_; }
-    /// The steepest that a cell can be: CellValues::edges.
-    double steepest() const { return steepest_; }
-    /// Of a cell, and where slabs have two ends of all cells within a step of it.
-    CellValues values(std::int64_t x, std::int64_t y, std::int64_t z) const;
+    /// Of all cells: their values, and the steepest that any is.
+    CellValues whole() const { return whole_; }
+    /// Of each cell of a box, x fastest: where slabs have two ends of all cells within a step of it.
+    std::vector<CellValues> values(const CellBox& box) const;
     /// Whether a ray's last sample may lie there.
     bool at_a_face(std::int64_t x, std::int64_t y, std::int64_t z) const;
 
   private:
-    struct Level {
+    template <class T>
+    struct Grid {
         std::array<std::int64_t, 3> blocks{};
-        std::vector<Found> block;
+        std::vector<T> block{};
         std::size_t index(std::int64_t x, std::int64_t y, std::int64_t z) const {
             return static_cast<std::size_t>((z * blocks[1] + y) * blocks[0] + x);
         }
+        T& at(std::int64_t x, std::int64_t y, std::int64_t z) { return block[index(x, y, z)]; }
     };
+    using Level = Grid<Found>;
     using Place = std::array<std::int64_t, 3>;
     CellValues of_cell(const Place& at) const;
-    std::vector<CellValues> plane(std::int64_t z) const;
-    void build_lowest(const SlabCosts& costs);
+    /// With light, where anything near can cost anything.
+    CellValues lit_cell(const Place& at) const;
+    bool has_one_cell() const { return within_a_step_ == Place{}; }
+    /// Cells along an axis that a slab with a rendered cell can meet.
+    struct Span {
+        std::int64_t first = 0, last = 0;
+        std::int64_t size() const { return last - first + 1; }
+    };
+    Span met(std::size_t axis) const;
+    void mark_lit();
+    void build_lowest();
     void build_above();
 
     const Volume& volume_;
+    const SlabCosts& costs_;
     CellBox cells_;
     Place
         within_a_step_{};  // cells from a slab's front to its back, at most; none where a slab has one input
     std::array<std::array<double, 2>, 3> inside_{};  // farther from the faces than a ray's last slab reaches
-    int lowest_bits_ = 0;                            // cells along a side of a block, as a power of two
-    double steepest_ = 0;
+    CellValues whole_;
+    std::optional<CellLights> lights_;
+    static constexpr int kMarkBits = 3;  // cells along a side of a marked block, as a power of two
+    std::optional<Grid<char>> marks_;    // of slabs with two ends; none: all
+    int lowest_bits_ = 0;                // cells along a side of a block, as a power of two
     std::vector<Level> levels_;
 };
 

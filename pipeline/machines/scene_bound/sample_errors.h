@@ -8,13 +8,15 @@
 
 namespace squint {
 
-/// The values of a cell: its eight corners, and the sum over the axes of its steepest edges, in levels.
+/// The values of a cell: its eight corners, and the sum over the axes of its steepest edges, in levels.  Of lit scenes,
+/// the most that v = g / max(|g|, g_0) changes by as the point does, a voxel, and as g does (light_errors.h).
 struct CellValues {
-    double low = 0, high = 0, edges = 0;
+    double low = 0, high = 0, edges = 0, turn = 0, weak = 0;
     bool flat() const { return low == high; }
     void take(const CellValues& other) {
         low = std::min(low, other.low), high = std::max(high, other.high),
-        edges = std::max(edges, other.edges);
+        edges = std::max(edges, other.edges), turn = std::max(turn, other.turn),
+        weak = std::max(weak, other.weak);
     }
 };
 

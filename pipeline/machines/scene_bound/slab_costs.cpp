@@ -48,6 +48,29 @@ double off_of_lines(const OpacityUnit& table) {
            portable::exp(-std::ldexp(table.rows.rows() - 2, -table.row_bits));
 }
 
+/// h(v - light): a slab that is seen by `alpha` costs alpha `light` more.
+Costs lit(const Costs& dark, const LitCosts& before, double light) {
+    Costs costs;
+    for (std::size_t k = 0; k < kKnots.size(); ++k) {
+        const double v = kKnots[k] - light;
+        double h = 0;
+        if (v >= 0) {
+            h = dark.more(v);
+        } else if (v < -1) {
+            h = before.at[kKnots.size() - 2] - (v + 1) * static_cast<double>(before.at.back());
+        } else {
+            std::size_t i = 1;
+            while (i + 1 < kKnots.size() && kKnots[i] < -v) ++i;
+            const double way = (-v - kKnots[i - 1]) / (kKnots[i] - kKnots[i - 1]),
+                         from = i == 1 ? dark.at[0] : before.at[i - 2];
+            h = from + way * (static_cast<double>(before.at[i - 1]) - from);
+        }
+        costs.at[k] = not_less(h + std::abs(h) * 0x1p-30 + 0x1p-60);
+    }
+    costs.at.back() = not_less((dark.last() + light * before.at.back()) * (1 + 0x1p-30));
+    return costs;
+}
+
 /// How far two neighbouring words of a table's column are from the values that they stand for.
 struct RowErrors {
     double most = 0;
@@ -56,8 +79,8 @@ struct RowErrors {
 
 }  // namespace
 
-SlabCosts::SlabCosts(const Plan& plan, const SampleErrors& errors, double reach)
-    : errors_(errors), reach_(reach) {
+SlabCosts::SlabCosts(const Plan& plan, const SampleErrors& errors, const LightErrors& light, double reach)
+    : errors_(errors), light_(light), reach_(reach) {
     const Function function(plan);
     const EntryLookup& e = entries_of(plan);
     const int last = function.last();
@@ -74,26 +97,33 @@ SlabCosts::SlabCosts(const Plan& plan, const SampleErrors& errors, double reach)
         if (pips) add_ways(plan, *pips, function, from, to, bin_.back());
     }
     for (int i = 0; i <= last; ++i) flat_.push_back(bin_at(plan, function, i, i));
+    for (std::vector<InputBin>* bins : {&bin_, &flat_})
+        for (InputBin& bin : *bins) bin.count_with(light.brightest);
     costing_.push_back(0), visible_.push_back(0);
     for (const InputBin& bin : bin_) {
         costing_.push_back(costing_.back() + (bin.costs() || bin.opacity > 0));
         visible_.push_back(visible_.back() + bin.visible);
     }
     for (int i = 0; i < kErrors; ++i) error_.push_back(i < 2 ? 0 : std::ldexp(reach, i + 1 - kErrors));
-    const int levels = std::bit_width(static_cast<unsigned>(count));
-    table_.assign(kErrors, std::vector<std::vector<Costs>>(static_cast<std::size_t>(levels)));
-    for (std::size_t m = 0; m < kErrors; ++m) {
-        auto& level = table_[m];
-        for (InputBin bin : bin_) {
-            if (m == 0) bin.wall = bin.last_wall = 0;
-            level[0].push_back(costs_of(bin, error_[m]));
+    const auto fill = [&](auto& table, const auto& of) {
+        table.resize(kErrors);
+        for (std::size_t m = 0; m < kErrors; ++m) {
+            auto& level = table[m];
+            level.resize(static_cast<std::size_t>(std::bit_width(static_cast<unsigned>(count))));
+            for (InputBin bin : bin_) {
+                if (m == 0) bin.wall = bin.last_wall = 0;
+                level[0].push_back(of(bin, error_[m]));
+            }
+            for (std::size_t l = 1; l < level.size(); ++l) {
+                const std::size_t half = std::size_t{1} << (l - 1);
+                level[l] = level[l - 1];
+                for (std::size_t i = 0; i + half < level[l].size(); ++i)
+                    level[l][i].take(level[l - 1][i + half]);
+            }
         }
-        for (std::size_t l = 1; l < level.size(); ++l) {
-            const std::size_t half = std::size_t{1} << (l - 1);
-            level[l] = level[l - 1];
-            for (std::size_t i = 0; i + half < level[l].size(); ++i) level[l][i].take(level[l - 1][i + half]);
-        }
-    }
+    };
+    fill(table_, costs_of);
+    if (light.lit) fill(lit_table_, lit_costs_of);
 }
 
 InputBin SlabCosts::bin_at(const Plan& plan, const Function& f, double from, double to) const {
@@ -147,6 +177,7 @@ InputBin SlabCosts::bin_at(const Plan& plan, const Function& f, double from, dou
     bin.opacity = bin.visible ? std::max(opacity_of(depths.low) - off - 0x1p-40, 0.0) : 0;
     const Steepness steep = steepness(f, low, high);
     const double seen = bin.visible ? most : 0;
+    bin.seen = bin.last_seen = seen;
     bin.steep = steep.full + seen * color_steep;
     bin.last_steep = steep.shorter + seen * color_steep;
     const auto add_color = [&](Shares& shares) {
@@ -184,6 +215,7 @@ InputBin SlabCosts::bin_at(const Plan& plan, const Function& f, double from, dou
         last[index_of(Wire::length)] += rounding_of(1e-300, plan.location.length.rounding) *
                                         std::ldexp(1.0, -e.length_fraction) * deepest;
         bin.last_table = last.sum();
+        bin.last_seen = std::max(seen, std::min(opacity_of(depths.high) + bin.last_table, 1.0));
     }
 
     // A wall: the word is opaque and the input without rounding is not, or the other way about.
@@ -195,6 +227,7 @@ InputBin SlabCosts::bin_at(const Plan& plan, const Function& f, double from, dou
         bin.wall = portable::exp(-least_there), bin.last_wall = 1;
     }
     if (near.all) bin.opacity = f.opaque(from, to).all ? 1 : bin.opacity;
+    if (near.any) bin.seen = bin.last_seen = 1;
     return bin;
 }
 
@@ -280,6 +313,9 @@ void SlabCosts::add_ways(const Plan& plan, const PowerSeriesOfOrder1& pips, cons
 
     bin.visible = visible;
     bin.opacity = std::min(bin.opacity, visible ? std::max(opacity_of(depths.low) - off - 0x1p-40, 0.0) : 0);
+    // A mean of depths is no less than the opacity of their sum.
+    bin.seen = std::max(bin.seen, visible ? depths.high + off : 0);
+    bin.last_seen = std::max({bin.last_seen, bin.seen, depths.high + last.sum()});
     bin.steep = std::max(bin.steep, steep), bin.last_steep = std::max(bin.last_steep, steep);
     if (table.sum() > bin.table) bin.of_table = table, bin.table = table.sum();
     if (last.sum() > bin.last_table) bin.of_last_table = last, bin.last_table = last.sum();
@@ -291,6 +327,15 @@ Costs SlabCosts::costs_of(const InputBin& bin, double error) {
         costs.at[k] =
             not_less((bin.steep * error + bin.table + bin.wall) * (1 + 0x1p-40) - bin.opacity * kKnots[k]);
     costs.at.back() = not_less((bin.last_steep * error + bin.last_table + bin.last_wall) * (1 + 0x1p-40));
+    return costs;
+}
+
+LitCosts SlabCosts::lit_costs_of(const InputBin& bin, double error) {
+    LitCosts costs;
+    for (std::size_t k = 1; k < kKnots.size(); ++k)
+        costs.at[k - 1] =
+            not_less((bin.steep * error + bin.table + bin.wall + bin.seen * kKnots[k]) * (1 + 0x1p-40));
+    costs.at.back() = not_less(bin.last_seen);
     return costs;
 }
 
@@ -308,37 +353,44 @@ SlabCosts::Bins SlabCosts::bins_of(const CellValues& cell, bool reached) const {
     return {first, std::clamp(static_cast<int>(std::ceil(high)) - 1, first, most)};
 }
 
-Costs SlabCosts::greatest_of(std::size_t error, const Bins& bins) const {
-    const auto count = static_cast<unsigned>(bins.last - bins.first + 1);
-    const int level = std::bit_width(count) - 1;
-    const std::vector<Costs>& row = table_[error][static_cast<std::size_t>(level)];
-    Costs all = row[static_cast<std::size_t>(bins.first)];
-    all.take(row[static_cast<std::size_t>(bins.last + 1 - (1 << level))]);
-    return all;
+bool SlabCosts::may_cost(const CellValues& cell) const {
+    return !cost_nothing(bins_of(cell, true));
 }
 
 Costs SlabCosts::of(const CellValues& cell) const {
-    if (const InputBin* flat = flat_bin(cell)) {
+    const double light = light_of(cell), error = errors_.of(cell);
+    const InputBin* flat = flat_bin(cell);
+    if (flat && !(light > 0)) {
         InputBin bin = *flat;
         bin.wall = bin.last_wall = 0;
         return costs_of(bin, 0);
     }
-    const double error = errors_.of(cell);
-    const Bins bins = bins_of(cell, error > 0);
-    if (costing_[static_cast<std::size_t>(bins.last) + 1] == costing_[static_cast<std::size_t>(bins.first)])
-        return {};
-    if (!(error > 0)) return greatest_of(0, bins);
+    const Bins bins = bins_of(cell, error > 0 || light > 0);
+    if (cost_nothing(bins)) return {};
+    const auto greatest_of = [&](const auto& table, std::size_t m) {
+        const auto count = static_cast<unsigned>(bins.last - bins.first + 1);
+        const int level = std::bit_width(count) - 1;
+        const auto& row = table[m][static_cast<std::size_t>(level)];
+        auto all = row[static_cast<std::size_t>(bins.first)];
+        all.take(row[static_cast<std::size_t>(bins.last + 1 - (1 << level))]);
+        return all;
+    };
+    if (!(error > 0) && !(light > 0)) return greatest_of(table_, 0);
     std::size_t m = 2;
     while (m + 1 < error_.size() && error_[m] < error) ++m;
     // Convex in the error as well: at most straight between two.
     const auto way = static_cast<float>((error - error_[m - 1]) / (error_[m] - error_[m - 1]));
-    Costs all = greatest_of(m - 1, bins);
-    const Costs far = greatest_of(m, bins);
-    for (std::size_t i = 0; i < all.at.size(); ++i) {
-        const float step = far.at[i] - all.at[i];
-        all.at[i] += way * step + (std::abs(all.at[i]) + std::abs(far.at[i])) * 0x1p-21f;
-    }
-    return all;
+    const auto between = [&](const auto& table) {
+        auto all = greatest_of(table, m - 1);
+        const auto far = greatest_of(table, m);
+        for (std::size_t i = 0; i < all.at.size(); ++i) {
+            const float step = far.at[i] - all.at[i];
+            all.at[i] += way * step + (std::abs(all.at[i]) + std::abs(far.at[i])) * 0x1p-21f;
+        }
+        return all;
+    };
+    const Costs dark = between(table_);
+    return light > 0 ? lit(dark, between(lit_table_), light) : dark;
 }
 
 bool SlabCosts::visible(const CellValues& cell) const {
@@ -350,25 +402,29 @@ bool SlabCosts::visible(const CellValues& cell) const {
 
 SlabCosts::Decided SlabCosts::decided(const CellValues& cell, double v, bool last) const {
     Decided best;
-    const double error = errors_.of(cell);
+    const double error = errors_.of(cell), light = light_of(cell);
     double most = -std::numeric_limits<double>::infinity();
     const auto ask = [&](const InputBin& bin, int index) {
-        const double wall = error > 0 ? (last ? bin.last_wall : bin.wall) : 0,
-                     steep = last ? bin.last_steep : bin.steep, table = last ? bin.last_table : bin.table;
-        const double cost = steep * error + table + wall, opacity = last ? 0 : bin.opacity;
+        const double wall = error > 0 || light > 0 ? (last ? bin.last_wall : bin.wall) : 0,
+                     steep = last ? bin.last_steep : bin.steep, table = last ? bin.last_table : bin.table,
+                     seen = last        ? bin.last_seen
+                            : light > v ? bin.seen
+                                        : bin.opacity;
+        const double cost = steep * error + table + wall + seen * light,
+                     opacity = last ? 0 : std::min(seen, 1.0);
         if (!(cost - opacity * v > most)) return;
         most = cost - opacity * v;
         best = {cost, opacity, last ? bin.of_last_table : bin.of_table, index};
         best.shares.add(errors_.shares_of(cell), steep);
+        if (light_.lit) best.shares.add(light_.shares_of(cell), seen);
         best.shares[kWallsPay] += wall;
     };
-    if (const InputBin* flat = flat_bin(cell)) {
+    if (const InputBin* flat = flat_bin(cell); flat && !(light > 0)) {
         ask(*flat, static_cast<int>(cell.low * per_entry_));
         return best;
     }
-    const Bins bins = bins_of(cell, error > 0);
-    if (costing_[static_cast<std::size_t>(bins.last) + 1] == costing_[static_cast<std::size_t>(bins.first)])
-        return best;
+    const Bins bins = bins_of(cell, error > 0 || light > 0);
+    if (cost_nothing(bins)) return best;
     for (int i = bins.first; i <= bins.last; ++i) ask(bin_[static_cast<std::size_t>(i)], i);
     return best;
 }

@@ -28,9 +28,10 @@
 #pragma once
 
 #include "pipeline/machines/certificate/function.h"
-#include "pipeline/machines/scene_bound/sample_errors.h"
+#include "pipeline/machines/scene_bound/light_errors.h"
 #include "pipeline/plan/plan.h"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <variant>
@@ -53,8 +54,9 @@ struct Costs {
     void take(const Costs& other) {
         for (std::size_t i = 0; i < at.size(); ++i) at[i] = at[i] < other.at[i] ? other.at[i] : at[i];
     }
-    /// h(v), 0 <= v <= 1.
+    /// h(v), v >= 0: it falls, and v beyond 1 counts as 1.
     double more(double v) const {
+        v = std::min(v, 1.0);
         std::size_t k = 1;
         while (k + 1 < kKnots.size() && kKnots[k] < v) ++k;
         const double way = (v - kKnots[k - 1]) / (kKnots[k] - kKnots[k - 1]);
@@ -65,21 +67,37 @@ struct Costs {
 /// Inputs between two places of the function, closer than rows of its table.
 struct InputBin {
     double steep = 0, table = 0, wall = 0;  // a = steep e + table, + wall where e > 0
-    double opacity = 0;                     // the least that a word there can have
-    double last_steep = 0, last_table = 0, last_wall = 0;
+    double opacity = 0, seen = 0;           // the least that a word there can have, and the most
+    double last_steep = 0, last_table = 0, last_wall = 0, last_seen = 0;
     bool visible = false;  // a word there may have an opacity above zero
     Shares of_table, of_last_table;
+    /// Errors of an opacity count with colours up to `brightest`.
+    void count_with(double brightest) {
+        for (double* cost : {&steep, &table, &wall, &last_steep, &last_table, &last_wall}) *cost *= brightest;
+        of_table = of_table.scaled(brightest), of_last_table = of_last_table.scaled(brightest);
+    }
     bool costs() const { return steep > 0 || table > 0 || wall > 0 || last_table > 0 || last_wall > 0; }
+};
+
+/// h at -v of every knot but zero; then the most that a ray's last slab can be seen.
+struct LitCosts {
+    std::array<float, kKnots.size()> at{};
+
+    void take(const LitCosts& other) {
+        for (std::size_t i = 0; i < at.size(); ++i) at[i] = at[i] < other.at[i] ? other.at[i] : at[i];
+    }
 };
 
 /// The costs of post-classification, whose slabs are one input, and of PIPS(1), whose slabs are a way between two.
 class SlabCosts {
   public:
     /// `reach`: the most that an input is off by, in entries.
-    SlabCosts(const Plan& plan, const SampleErrors& errors, double reach);
+    SlabCosts(const Plan& plan, const SampleErrors& errors, const LightErrors& light, double reach);
 
     /// Of a slab whose sample lies in a cell of these values, or would without rounding.
     Costs of(const CellValues& cell) const;
+    /// Whether any slab with a sample near such a cell can cost anything.
+    bool may_cost(const CellValues& cell) const;
     /// Whether a word whose sample lies in such a cell can be seen.
     bool visible(const CellValues& cell) const;
 
@@ -95,6 +113,8 @@ class SlabCosts {
     double entry_of(int bin) const { return bin / per_entry_; }
 
   private:
+    template <class T>
+    using Greatest = std::vector<std::vector<std::vector<T>>>;
     struct Bins {
         int first = 0, last = 0;
     };
@@ -105,16 +125,23 @@ class SlabCosts {
     void add_ways(const Plan& plan, const PowerSeriesOfOrder1& pips, const Function& function, double from,
                   double to, InputBin& bin) const;
     static Costs costs_of(const InputBin& bin, double error);
-    Costs greatest_of(std::size_t error, const Bins& bins) const;
+    static LitCosts lit_costs_of(const InputBin& bin, double error);
+    double light_of(const CellValues& cell) const { return light_.lit ? light_.of(cell) : 0; }
+    bool cost_nothing(const Bins& bins) const {
+        return costing_[static_cast<std::size_t>(bins.last) + 1] ==
+               costing_[static_cast<std::size_t>(bins.first)];
+    }
 
     SampleErrors errors_;
+    LightErrors light_;
     double reach_ = 0, per_entry_ = 1;
     double steepest_row_ = 0;             // the most that extinction changes in a row of T
     std::vector<InputBin> bin_, flat_;    // flat_: of whole entries, for cells that hold nothing else
     std::vector<int> costing_, visible_;  // how many bins before this one
     // The greatest costs of 2^l bins from each on, for each error: none, above none, then doubling up to reach_.
     std::vector<double> error_;
-    std::vector<std::vector<std::vector<Costs>>> table_;
+    Greatest<Costs> table_;
+    Greatest<LitCosts> lit_table_;  // of lit scenes
 };
 
 }  // namespace squint

@@ -36,8 +36,35 @@ struct Drawn {
     Scene scene;
     std::shared_ptr<const Volume> volume;
 };
-/// A scene of what has a scene bound: a small volume, its formats a few bits off.  By post-classification, or by PIPS(1).
-Drawn draw_scene(unsigned seed, bool pips = false) {
+/// What kind of scene: by post-classification or by PIPS(1), unlit or lit.
+struct Kind {
+    bool pips = false, lit = false;
+};
+/// Light that has a scene bound.
+void draw_light(Draw& draw, Scene& scene) {
+    for (std::int64_t i = draw.between(1, 3); i > 0; --i) {
+        Light light;
+        light.headlight = draw.once_in(2);
+        if (!light.headlight) light.direction = draw.vector(-1, 1);
+        if (draw.once_in(3)) light.color = draw.vector(0, 1);
+        scene.lights.push_back(light);
+    }
+    ShadingSettings& shading = scene.shading;
+    shading.gradient = draw.one_of({GradientRule::central, GradientRule::sobel});
+    shading.gradient_floor = draw.one_of({0.3, 1.0, 4.0, draw.real(0.1, 30)});
+    shading.ka = draw.one_of({0.0, draw.real(0, 0.3)});
+    shading.kd = draw.one_of({0.0, draw.real(0, 1 - shading.ka)});
+    shading.ks = draw.one_of({0.0, 1 - shading.ka - shading.kd, draw.real(0, 1 - shading.ka - shading.kd)});
+    if (draw.once_in(3)) shading.ks = draw.real(0, 0.99);
+    shading.power = draw.any_of<PowerRule>();
+    shading.exponent = draw.one_of({1.0, 2.0, 8.0, 32.0, 128.0});
+    if (shading.power != PowerRule::squaring && draw.once_in(2)) shading.exponent = draw.real(1, 40);
+    shading.two_sided = draw.once_in(3);
+    if (scene.classification.method == Method::pips)
+        shading.inside = draw.one_of({InsideRule::front, InsideRule::mean});
+}
+/// A scene of what has a scene bound: a small volume, its formats a few bits off.
+Drawn draw_scene(unsigned seed, Kind kind = {}) {
     Draw draw(seed);
     Scene scene = built_in_scene();
     scene.image.width = scene.image.height = 12;
@@ -68,13 +95,14 @@ Drawn draw_scene(unsigned seed, bool pips = false) {
     scene.sampling.lerp = draw.any_of<LerpRule>();
     scene.classification = {};
     scene.classification.method = draw.one_of({Method::pc, Method::pc_mid});
-    if (pips) scene.classification.method = Method::pips;
+    if (kind.pips) scene.classification.method = Method::pips;
+    if (kind.lit) draw_light(draw, scene);
     if (draw.once_in(5)) scene.classification.encoding = draw.any_of<AlphaEncoding>();
     scene.compositing.form =
         draw.one_of({CompositingForm::automatic, CompositingForm::w, CompositingForm::w_carry,
                      CompositingForm::equation_9, CompositingForm::alpha, CompositingForm::back_to_front});
     scene.precision.preset = draw.one_of<const char*>({"default", "default", "squeeze", "eight_bit", "wide"});
-    if (draw.once_in(6)) scene.compositing.mode = draw.any_of<CompositingMode>();
+    if (!kind.lit && draw.once_in(6)) scene.compositing.mode = draw.any_of<CompositingMode>();
     const Plan plan = make_plan(scene, volume);
     if (draw.once_in(2)) return {scene, volume};
     for (std::int64_t i = draw.between(1, 6); i > 0; --i) {
@@ -127,14 +155,14 @@ SceneBound bound_with(const Plan& plan, int threads, std::int64_t beams) {
     return bound_scene(plan, options);
 }
 
-void check_scenes(bool pips) {
-    const unsigned scenes = number_from_environment("SQUINT_SCENES", 150),
+void check_scenes(Kind kind, unsigned few) {
+    const unsigned scenes = number_from_environment("SQUINT_SCENES", few),
                    first = number_from_environment("SQUINT_SEED", 1);
     unsigned drawn = 0, failures = 0, told = 0, above = 0;
     double closest = 0;
     for (unsigned seed = first; drawn < scenes && failures < 3; ++seed) {
         try {
-            const Drawn d = draw_scene(seed, pips);
+            const Drawn d = draw_scene(seed, kind);
             const SceneBound bound = bound_with(make_plan(d.scene, d.volume), 1, 3000);
             ++drawn;
             told += bound.most < 250;
@@ -163,15 +191,21 @@ void check_scenes(bool pips) {
         first, drawn, told, closest, above);
 }
 TEST(SceneBound, IsExceededByNoViewOfScenesDrawnAtRandom) {
-    check_scenes(false);
+    check_scenes({}, 150);
 }
 TEST(SceneBound, OfSlabsBetweenTwoInputsIsExceededByNoViewOfScenesDrawnAtRandom) {
-    check_scenes(true);
+    check_scenes({.pips = true}, 150);
+}
+TEST(SceneBound, OfLitScenesIsExceededByNoViewOfScenesDrawnAtRandom) {
+    check_scenes({.lit = true}, 80);
+}
+TEST(SceneBound, OfLitSlabsBetweenTwoInputsIsExceededByNoViewOfScenesDrawnAtRandom) {
+    check_scenes({.pips = true, .lit = true}, 40);
 }
 
 TEST(SceneBound, PassesFullScaleWhereRoundingsOfCompositingDo) {
     constexpr unsigned kSeed = 6084;  // opacity that is kept as 1 - T, in one fraction bit
-    const Drawn d = draw_scene(kSeed, true);
+    const Drawn d = draw_scene(kSeed, {.pips = true});
     const SceneBound bound = bound_with(make_plan(d.scene, d.volume), 1, 3000);
     Draw draw(kSeed + 100000);
     double most = 0;
@@ -238,7 +272,19 @@ TEST(SceneBound, RefusesWhatItDoesNotBoundInOneLine) {
     };
     const std::string dark = "lights=[]", pc = "classification.method=pc", small = "volume.dims=8";
     EXPECT_THAT(refusal({small, pc}), HasSubstr("hopeless for a lit scene without shading.gradient_floor"));
-    EXPECT_THAT(refusal({small, pc, "shading.gradient_floor=1"}), HasSubstr("light has no scene bound yet"));
+    const std::string floor = "shading.gradient_floor=1";
+    EXPECT_EQ(refusal({small, pc, floor}), "nothing was refused");
+    EXPECT_THAT(refusal({small, floor}), HasSubstr("shading.inside two_point"));
+    EXPECT_EQ(refusal({small, floor, "shading.inside=front"}), "nothing was refused");
+    EXPECT_EQ(refusal({small, floor, "shading.inside=mean"}), "nothing was refused");
+    EXPECT_THAT(refusal({small, pc, floor, "shading.model=phong"}), HasSubstr("shading.model phong"));
+    EXPECT_THAT(refusal({small, pc, floor, "shading.gradient=analytic"}),
+                HasSubstr("shading.gradient analytic"));
+    EXPECT_THAT(refusal({small, pc, floor, "shading.exaggeration=1"}), HasSubstr("shading.exaggeration 1"));
+    EXPECT_THAT(refusal({small, pc, floor, "shading.ka=0.5", "shading.ks=1"}),
+                HasSubstr("precision.lit_color"));
+    EXPECT_THAT(refusal({small, pc, floor, "precision.gradient=s2.10"}),
+                HasSubstr("precision.gradient: s2.10"));
     EXPECT_THAT(refusal({small, dark, "classification.method=leg"}), HasSubstr("classification.method leg"));
     EXPECT_THAT(refusal({small, dark, "classification.method=pips", "classification.order=2"}),
                 HasSubstr("pips of order 1"));
@@ -270,14 +316,19 @@ TEST(SceneBound, OfWallsSaysThatItIsHopelessAndWhere) {
 // functions for which the bound by entries is nearly what a picture shows.
 struct SceneRule {
     int payer = 0;  // a wire, or one of the causes behind them
-    bool pips = false;
+    Kind kind = {};
     bool one_color =
         false;  // by an error of an input, a colour may change as an opacity does: either is seen alone
+    bool highlights = false;  // of light, alone
 };
 std::string name_of(const SceneRule& rule) {
     std::string name(payer_name(rule.payer));
     std::replace(name.begin(), name.end(), ' ', '_');
-    return name + (rule.pips ? "_of_pips" : "");
+    return name +
+           (rule.highlights ? "_of_highlights"
+            : rule.kind.lit ? "_of_light"
+                            : "") +
+           (rule.kind.pips ? "_of_pips" : "");
 }
 class EverySceneRule : public ::testing::TestWithParam<SceneRule> {};
 TEST_P(EverySceneRule, HalvedIsExceededByASceneOfItsOwn) {
@@ -285,12 +336,16 @@ TEST_P(EverySceneRule, HalvedIsExceededByASceneOfItsOwn) {
     double best = 0;
     for (unsigned seed = 1; seed <= 400 && best <= 0.5; ++seed) {
         try {
-            Drawn d = draw_scene(seed, GetParam().pips);
+            Drawn d = draw_scene(seed, GetParam().kind);
             Draw draw(seed + 7777);
             d.scene.precision = {};
             d.scene.precision.preset = "wide";
             if (GetParam().one_color)
                 for (auto& point : d.scene.transfer_function.points) point[1] = point[2] = point[3] = 1;
+            // Of light alone: matter is the same everywhere.
+            if (GetParam().kind.lit)
+                for (auto& point : d.scene.transfer_function.points) point[4] = 0.9;
+            if (GetParam().highlights) d.scene.shading.ka = d.scene.shading.kd = 0, d.scene.shading.ks = 0.9;
             d.scene.sampling.termination = 0;
             d.scene.classification.encoding = AlphaEncoding::alpha;
             // One slab: what a wire may take is seen where nothing can undo it.
@@ -305,7 +360,7 @@ TEST_P(EverySceneRule, HalvedIsExceededByASceneOfItsOwn) {
                 plan = make_plan(d.scene, d.volume);
             }
             const SceneBound bound = bound_with(plan, 1, 400);
-            if (GetParam().pips && bound.payer != payer) continue;
+            if ((GetParam().kind.pips || GetParam().kind.lit) && bound.payer != payer) continue;
             for (int view = 0; view < 3; ++view)
                 best = std::max(best, seen_in(d.scene, d.volume, draw).error / bound.most);
         } catch (const InputError&) {
@@ -324,10 +379,17 @@ std::vector<SceneRule> scene_rules() {
         all.push_back({static_cast<int>(wire)});
     for (const Wire wire : {Wire::slab_depth, Wire::table_extinction, Wire::table_moment, Wire::length,
                             Wire::slab_ratio, Wire::slab_alpha})
-        all.push_back({static_cast<int>(wire), true});
+        all.push_back({static_cast<int>(wire), {.pips = true}});
     for (const Wire wire : {Wire::weight, Wire::sample, Wire::classification_input})
-        all.push_back({static_cast<int>(wire), true, true});
-    all.push_back({kRowsPay, true});
+        all.push_back({static_cast<int>(wire), {.pips = true}, true});
+    all.push_back({kRowsPay, {.pips = true}});
+    for (const Wire wire :
+         {Wire::weight, Wire::gradient_lerp, Wire::gradient, Wire::spacing, Wire::normal, Wire::confidence,
+          Wire::light, Wire::dot, Wire::power, Wire::material, Wire::intensity, Wire::lit_color})
+        all.push_back({static_cast<int>(wire), {.lit = true}, true});
+    for (const Wire wire : {Wire::weight, Wire::dot})
+        all.push_back({static_cast<int>(wire), {.lit = true}, true, true});
+    all.push_back({static_cast<int>(Wire::slab_alpha), {.lit = true}, true});
     return all;
 }
 INSTANTIATE_TEST_SUITE_P(SceneBound, EverySceneRule, ::testing::ValuesIn(scene_rules()),
