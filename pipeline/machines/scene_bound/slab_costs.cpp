@@ -252,7 +252,7 @@ void SlabCosts::add_ways(const Plan& plan, const PowerSeriesOfOrder1& pips, cons
     const double rows = std::ldexp(1.0, p.sub_entry_bits),
                  depth_unit = std::ldexp(rows, -e.extinction_fraction),
                  light_unit = std::ldexp(rows, -plan.specs[Wire::table_moment].format.fraction_bits);
-    double off_depth = 0, off_rise = 0, off_light = 0, of_rows = 0, beyond = 0;
+    double off_depth = 0, off_rise = 0, off_light = 0, of_rows = 0;
     bool visible = bin.visible;
     const auto first = static_cast<std::int64_t>(from * rows);
     for (std::int64_t r = first; r + 1 < p.depth.rows() && (r == first || static_cast<double>(r) < to * rows);
@@ -268,21 +268,21 @@ void SlabCosts::add_ways(const Plan& plan, const PowerSeriesOfOrder1& pips, cons
             depth{f.at(Function::depth, place[0]), f.at(Function::depth, place[1])};
         off_depth = std::max({off_depth, std::abs(rate - bend - depth[0]), std::abs(rate + bend - depth[1])});
         off_rise = std::max(off_rise, std::abs(rate - (depth[0] + depth[1]) / 2));
-        beyond = std::max(beyond, std::abs(bend) - rate);
         for (std::size_t c = 0; c < 3; ++c) {
             const std::array<double, 2> color{f.at(c, place[0]), f.at(c, place[1])};
             const double light = (color[0] * depth[0] + color[1] * depth[1]) / 3 +
                                  (color[0] * depth[1] + color[1] * depth[0]) / 6;
             off_light =
                 std::max(off_light, std::abs(rise(pips.moment, static_cast<int>(c), light_unit) - light));
-            of_rows = std::max(
-                of_rows, (std::max(depth[0], depth[1]) + steepest_row_ / 4) * std::abs(color[1] - color[0]));
+            // Of the row's colour to the farther of its ends.
+            const double deeper = std::max(depth[0], depth[1]), both = depth[0] + depth[1],
+                         farther = both > 0 ? (1 + deeper / both) / 3 : 0;
+            of_rows =
+                std::max(of_rows, (deeper * farther + steepest_row_ / 4) * std::abs(color[1] - color[0]));
         }
     }
-    // The colour divides by straight rises, of which an opacity may see twice where T bends.
-    const double twice = p.curved ? 2 : 1;
-
-    // An error of the opacity counts with a colour that may be any.
+    // The colour divides by straight rises, of which a depth is twice as much at most.
+    constexpr double kTwice = 2;
     const double of_depth =
                      rounding_of(1e-300, p.to_depth.rounding) * std::ldexp(1.0, -e.opacity.depth_fraction),
                  of_alpha = unit_of(e.opacity.to_alpha) * std::ldexp(1.0, -e.opacity.alpha_fraction) +
@@ -292,14 +292,14 @@ void SlabCosts::add_ways(const Plan& plan, const PowerSeriesOfOrder1& pips, cons
     Shares table;
     if (visible || depths.high > 0) {
         const double of_words = std::min(off_depth, depth_unit);
-        table[index_of(Wire::table_extinction)] = 2 * of_words;
-        table[kRowsPay] = 2 * (off_depth - of_words);
+        table[index_of(Wire::table_extinction)] = of_words;
+        table[kRowsPay] = off_depth - of_words;
         if (visible) {
-            table[index_of(Wire::table_moment)] = twice * off_light;
-            table[index_of(Wire::table_extinction)] += twice * 2 * off_rise + beyond;
-            table[kRowsPay] += twice * of_rows;
-            table[index_of(Wire::slab_depth)] = 2 * of_depth;
-            table[index_of(Wire::slab_alpha)] = 2 * of_alpha;
+            table[index_of(Wire::table_moment)] = kTwice * off_light;
+            table[index_of(Wire::table_extinction)] += kTwice * 2 * off_rise;
+            table[kRowsPay] += of_rows;
+            table[index_of(Wire::slab_depth)] = of_depth;
+            table[index_of(Wire::slab_alpha)] = of_alpha;
             table[index_of(Wire::slab_ratio)] =
                 seen * rounding_of(1e-300, pips.to_ratio.rounding) * std::ldexp(1.0, -e.color_fraction);
         }
@@ -307,7 +307,7 @@ void SlabCosts::add_ways(const Plan& plan, const PowerSeriesOfOrder1& pips, cons
     Shares last = table;
     if (visible)
         last[index_of(Wire::slab_depth)] +=
-            2 * rounding_of(1e-300, e.to_shorter.rounding) * std::ldexp(1.0, -e.opacity.depth_fraction);
+            rounding_of(1e-300, e.to_shorter.rounding) * std::ldexp(1.0, -e.opacity.depth_fraction);
     last[index_of(Wire::length)] +=
         std::ldexp(1.0, -e.length_fraction) * f.over(Function::depth, low, high).high;
 

@@ -14,17 +14,23 @@
 //     alpha'                              >=  mean of  alpha(tau(y)) - what rows take of it at y
 //
 // (X dK = int (c - K) dtau + int tau dc, alpha <= X; 1 - exp(-x) is concave).  Both are means over one way, so a_i -
-// alpha_i v is at most its greatest over all inputs on it: the same h, of all values
-// that a cell and those a step away hold.
+// alpha_i v is at most its greatest over all inputs on it: the same h, of all values that a cell and those a step away hold.
 //
-// Rows.  T and X rise at known rates, exactly straight between rows (T's bend apart), so a short way is off by no more than a
-// long one: by the rates' own errors, and in colour by what rows cannot tell.  With Q_r, S_r a way's parts of depth in row
-// r by straight rises and by tau, k_r its colour there, c_r the row's,
+// What rows and words take is counted at the words' own inputs, where (alpha', K') stand for (alpha, K):
 //
-//     K' - K = sum Q_r (c_r - k_r) / sum Q + sum (Q_r - S_r)(k_r - K) / sum Q.
+//     alpha' (K' - G) - alpha (K - G) = (alpha' - alpha)(K' - G) + alpha (K' - K):
 //
-// |c_r - k_r| is at most what c changes by in the row.  Q_r = S_r but in the two rows where the way ends, where they differ by
-// at most an eighth of a row times what tau changes by, and |k_r - K| is at most the mean of |c'| times the way.
+// an error of the opacity once, with whatever colour, and one of the colour by the depth x >= alpha without rounding.  T and X
+// rise at known rates, exactly straight between rows (T's bend apart), so a short way is off by no more than a long one: by the
+// rates' own errors, and in colour by what rows cannot tell.  With Q_r, S_r a way's parts of depth in row r by straight rises
+// and by tau, x = sum S, k_r its colour there, c_r the row's, and any colour c,
+//
+//     x (K' - K) = sum S_r (c_r - k_r) + sum (Q_r x / sum Q - S_r)(c_r - c).
+//
+// With tau_0, tau_1 and colours a, b at the row's ends, c_r is (2 tau_1 + tau_0) / (3 (tau_0 + tau_1)) of the way from a to b:
+// |c_r - k_r| is at most the longer way from there to an end.  Q_r = S_r but in the two rows where the way ends, where they
+// differ by at most an eighth of a row times what tau changes by; the second sum is at most twice that, times half of what c
+// changes by along the way.
 #pragma once
 
 #include "pipeline/machines/certificate/function.h"
