@@ -239,14 +239,9 @@ void SlabCosts::add_ways(const Plan& plan, const PowerSeriesOfOrder1& pips, cons
     const auto highest = static_cast<double>(f.last());
     const double low = std::max(from - reach_, 0.0), high = std::min(to + reach_, highest);
     const Reach depths = f.over(Function::depth, from, to);
-    std::array<Reach, 3> colors;
-    double color_steep = 0, range = 0;
-    for (std::size_t c = 0; c < 3; ++c) {
-        colors[c] = f.over(c, 0, highest);
-        range = std::max(range, colors[c].high - colors[c].low);
-        color_steep = std::max(color_steep, f.slope(c, low, high));
-    }
-    const double steep = f.slope(Function::depth, low, high) * (1 + range) + depths.high * color_steep;
+    double color_steep = 0;
+    for (std::size_t c = 0; c < 3; ++c) color_steep = std::max(color_steep, f.slope(c, low, high));
+    const double steep = f.slope(Function::depth, low, high) + depths.high * color_steep;
 
     // Rates of the words' rows, an entry, beside what rises there: extinction is straight in a row.
     const double rows = std::ldexp(1.0, p.sub_entry_bits),

@@ -7,14 +7,18 @@
 // where a_i is what the slab's own opacity and colour are off by.  h is convex in v: kept at a few v (kKnots),
 // it is at most straight between them.
 //
-// A slab of PIPS(1) is a mean along the straight way y from its front input to its back one: of extinction tau, and of
-// colour weighted by it.  Without opaque entries, and with e the most that either end is off by,
+// A slab of PIPS(1) is a mean along the straight way y from its front input to its back one: of extinction tau, x, and of
+// colour weighted by it, K.  With G what lies behind, alpha = 1 - exp(-x), b = alpha / x and D what a move of the ends changes,
 //
-//     |alpha' - alpha| + alpha' |K' - K|  <=  mean of  |tau'(y)| e (1 + range of c) + tau |c'(y)| e + what rows take at y
-//     alpha'                              >=  mean of  alpha(tau(y)) - what rows take of it at y
+//     D (alpha (K - G)) = mean of  (exp(-x) (c - G) + (b - exp(-x)) (c - K)) D tau + b tau D c,    exp(-x) <= b <= 1,
 //
-// (X dK = int (c - K) dtau + int tau dc, alpha <= X; 1 - exp(-x) is concave).  Both are means over one way, so a_i -
-// alpha_i v is at most its greatest over all inputs on it: the same h, of all values that a cell and those a step away hold.
+// so without opaque entries, and with e the most that either end is off by,
+//
+//     |alpha' (K' - G) - alpha (K - G)|  <=  mean of  |tau'(y)| e + tau |c'(y)| e + what rows take at y
+//     alpha'                             >=  mean of  alpha(tau(y)) - what rows take of it at y
+//
+// (x D K = int (c - K) D tau + int tau D c; 1 - exp(-x) is concave).  Both are means over one way, so a_i - alpha_i v is at most
+// its greatest over all inputs on it: the same h, of all values that a cell and those a step away hold.
 //
 // What rows and words take is counted at the words' own inputs, where (alpha', K') stand for (alpha, K):
 //
