@@ -165,8 +165,8 @@ constexpr std::int64_t kBlock = 8;
 class Ledger {
   public:
     Ledger(const Beams& beams, const CostBlocks& blocks, const SlabCosts& costs,
-           const CompositingCosts& compositing)
-        : beams_(beams), blocks_(blocks), costs_(costs), compositing_(compositing) {}
+           const CompositingCosts& compositing, bool lit)
+        : beams_(beams), blocks_(blocks), costs_(costs), compositing_(compositing), lit_(lit) {}
 
     Paid of(const Beam& beam) {
         beams_.walk(beam, [&](const CellBox& cells, std::int64_t samples, bool surely) {
@@ -195,8 +195,8 @@ class Ledger {
     Most most_of(const CellBox& cells) const {
         Most most;
         double best = 0;
-        // What is charged so far: blocks cost more than the cells that a beam can meet.
-        const double v = paid_.slabs.sum();
+        // Blocks cost more than the cells that a beam can meet: beside what they come to, light would pay nothing.
+        const double v = lit_ ? paid_.slabs.sum() : behind_.slabs;
         const std::vector<CellValues> of = blocks_.values(cells);
         std::size_t i = 0;
         for (std::int64_t z = cells.first[2]; z <= cells.last[2]; ++z)
@@ -213,13 +213,13 @@ class Ledger {
         return most;
     }
     void take(const CostBlocks::Found& found, const Most& most, bool surely) {
-        const double before = behind_.slabs, charged = paid_.slabs.sum();
+        const double before = behind_.slabs;
         beams_.step(behind_, found, surely);
         if (found.visible) {
             paid_.compositing.add(compositing_.shares, 1);
             paid_.compositing[index_of(Wire::transparency)] += compositing_.clear * before;
         }
-        if (most.last.cost > charged * (1 - most.slab.opacity) + most.slab.cost) {
+        if (most.last.cost > before + most.slab.cost) {
             paid_.slabs = {}, at_.clear();
             return charge(most.last, most.last_cell);
         }
@@ -238,6 +238,7 @@ class Ledger {
     const CostBlocks& blocks_;
     const SlabCosts& costs_;
     const CompositingCosts& compositing_;
+    bool lit_;
     Behind behind_;
     Paid paid_;
     std::map<std::array<std::int64_t, 3>, Block> at_;
@@ -343,7 +344,7 @@ SceneBound bound_scene(const Plan& plan, const SceneBoundOptions& options) {
         b.by_beams = in_lsb8(decides.behind);
         b.most = std::min({b.by_entries, b.by_blocks, b.by_beams});
 
-        const Paid paid = Ledger(beams, blocks, costs, compositing).of(decides.beam);
+        const Paid paid = Ledger(beams, blocks, costs, compositing, plan.lit).of(decides.beam);
         // Blocks cost more than the cells that a beam can meet: so much more by all causes of a slab.
         const double other = paid.compositing.sum() + termination + 0x1p-36, slabs = paid.slabs.sum();
         b.shares = paid.compositing.scaled(255);
