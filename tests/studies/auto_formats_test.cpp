@@ -79,8 +79,12 @@ TEST(AutoFormats, AreTheseOnEveryMachine) {
 }
 
 TEST(AutoFormats, OfEveryViewKeepTheSceneBoundWithinTheBudget) {
-    for (const char* budget : {"2", "8"}) {
-        const Chosen c = chosen({std::string("precision.budget=") + budget, "precision.guarantee=scene"});
+    const std::vector<std::string> lit{"lights=[{headlight=true}]", "shading.gradient_floor=16"};
+    for (const auto& [budget, light] :
+         std::vector<std::pair<std::string, std::vector<std::string>>>{{"2", {}}, {"8", {}}, {"6", lit}}) {
+        std::vector<std::string> overrides{"precision.budget=" + budget, "precision.guarantee=scene"};
+        overrides.insert(overrides.end(), light.begin(), light.end());
+        const Chosen c = chosen(overrides);
         SCOPED_TRACE(budget);
         ASSERT_TRUE(c.formats.within);
         EXPECT_THAT(c.formats.notes,

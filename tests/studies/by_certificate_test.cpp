@@ -75,6 +75,18 @@ TEST_F(ByCertificate, WritesFormatsWhoseSceneBoundHoldsForEveryView) {
     EXPECT_LE(bound_scene(make_plan(scene, volume)).most, r.found.bound);
 }
 
+TEST_F(ByCertificate, WritesFormatsForEveryViewOfALitScene) {
+    Settings s = small(8);
+    s.every_view = true;
+    for (const char* override_ :
+         {"classification.method=pc", "lights=[{headlight=true}]", "shading.gradient_floor=16"})
+        s.overrides.emplace_back(override_);
+    const CertifiedResult r = run_by_certificate(s);
+    ASSERT_EQ(r.failure, "");
+    EXPECT_LE(r.found.bound, 8);
+    EXPECT_LE(r.found.error, r.found.bound);
+}
+
 TEST_F(ByCertificate, TakesFewerBitsForALooserBound) {
     double bits = INFINITY;
     for (const double most : {0.4, 1.0, 4.0, 16.0}) {
