@@ -293,7 +293,7 @@ std::optional<std::string> what_has_no_scene_bound(const Plan& plan) {
             "back_to_front",
             name_of(form));
     if (plan.lit)
-        if (const auto obstacle = what_light_is_not_bounded(plan)) return obstacle;
+        if (auto obstacle = what_light_is_not_bounded(plan)) return obstacle;
     return what_saturates(plan);
 }
 

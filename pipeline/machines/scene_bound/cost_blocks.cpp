@@ -78,11 +78,15 @@ CostBlocks::Span CostBlocks::met(std::size_t axis) const {
 CellValues CostBlocks::lit_cell(const Place& at) const {
     CellValues cell = of_cell(at);
     if (!lights_) return cell;
-    const auto is_marked = [&] {
-        const auto block = [&](std::size_t axis) { return (at[axis] - met(axis).first) >> kMarkBits; };
-        return marks_->block[marks_->index(block(0), block(1), block(2))] != 0;
-    };
-    if (has_one_cell() ? costs_.may_cost(cell) : !marks_ || is_marked()) lights_->add_to(cell, at);
+    bool may_count = true;
+    if (has_one_cell()) {
+        may_count = costs_.may_cost(cell);
+    } else if (marks_) {
+        Place block{};
+        for (std::size_t a = 0; a < 3; ++a) block[a] = (at[a] - met(a).first) >> kMarkBits;
+        may_count = marks_->block[marks_->index(block[0], block[1], block[2])] != 0;
+    }
+    if (may_count) lights_->add_to(cell, at);
     return cell;
 }
 
