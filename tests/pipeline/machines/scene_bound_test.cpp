@@ -17,6 +17,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -314,20 +315,20 @@ TEST(SceneBound, OfWallsSaysThatItIsHopelessAndWhere) {
 
 // Each wire's rule, halved, is exceeded by a scene in which that wire alone is coarse and all others are wide: fields and
 // functions for which the bound by entries is nearly what a picture shows.
+enum class LightOf { any, diffuse, highlights, bright };
 struct SceneRule {
     int payer = 0;  // a wire, or one of the causes behind them
     Kind kind = {};
     bool one_color =
         false;  // by an error of an input, a colour may change as an opacity does: either is seen alone
-    bool highlights = false;  // of light, alone
+    LightOf light = LightOf::any;
 };
 std::string name_of(const SceneRule& rule) {
+    constexpr std::array<const char*, 5> kLightNames{"", "_of_light", "_of_diffuse_light", "_of_highlights",
+                                                     "_of_bright_light"};
     std::string name(payer_name(rule.payer));
     std::replace(name.begin(), name.end(), ' ', '_');
-    return name +
-           (rule.highlights ? "_of_highlights"
-            : rule.kind.lit ? "_of_light"
-                            : "") +
+    return name + kLightNames[rule.kind.lit ? 1 + static_cast<std::size_t>(rule.light) : 0] +
            (rule.kind.pips ? "_of_pips" : "");
 }
 class EverySceneRule : public ::testing::TestWithParam<SceneRule> {};
@@ -345,7 +346,13 @@ TEST_P(EverySceneRule, HalvedIsExceededByASceneOfItsOwn) {
             // Of light alone: matter is the same everywhere.
             if (GetParam().kind.lit)
                 for (auto& point : d.scene.transfer_function.points) point[4] = 0.9;
-            if (GetParam().highlights) d.scene.shading.ka = d.scene.shading.kd = 0, d.scene.shading.ks = 0.9;
+            ShadingSettings& shading = d.scene.shading;
+            if (GetParam().light == LightOf::diffuse) shading.ka = shading.ks = 0, shading.kd = 0.9;
+            if (GetParam().light == LightOf::highlights) shading.ka = shading.kd = 0, shading.ks = 0.9;
+            if (GetParam().light == LightOf::bright) {
+                shading.ka = shading.kd = 0.5, shading.ks = 0.9;
+                shading.power = PowerRule::squaring, shading.exponent = 1;
+            }
             d.scene.sampling.termination = 0;
             d.scene.classification.encoding = AlphaEncoding::alpha;
             // One slab: what a wire may take is seen where nothing can undo it.
@@ -388,8 +395,10 @@ std::vector<SceneRule> scene_rules() {
           Wire::light, Wire::dot, Wire::power, Wire::material, Wire::intensity, Wire::lit_color})
         all.push_back({static_cast<int>(wire), {.lit = true}, true});
     for (const Wire wire : {Wire::weight, Wire::dot})
-        all.push_back({static_cast<int>(wire), {.lit = true}, true, true});
-    all.push_back({static_cast<int>(Wire::slab_alpha), {.lit = true}, true});
+        for (const LightOf light : {LightOf::diffuse, LightOf::highlights})
+            all.push_back({static_cast<int>(wire), {.lit = true}, true, light});
+    // Counts with colours brighter than 1.
+    all.push_back({static_cast<int>(Wire::slab_alpha), {.lit = true}, true, LightOf::bright});
     return all;
 }
 INSTANTIATE_TEST_SUITE_P(SceneBound, EverySceneRule, ::testing::ValuesIn(scene_rules()),
