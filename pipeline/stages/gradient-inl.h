@@ -173,25 +173,42 @@ HWY_INLINE W to_world(const GradientStage& s, W component, int axis) {
                     s.to_scaled);
 }
 
-/// -g / |g| in s1.F, in integers: scales so that the largest component has kNormalBits bits (floor of its
-/// magnitude), takes n = floor(sqrt(sum of squares) 2^kNormalGuard), then three exact quotients.  Error:
-/// 2^-14 from scaling, where the gradient has more bits, plus half a last bit of the wire.  A zero gradient
-/// gives a zero normal.
+/// A gradient's magnitudes, scaled so that the largest has kNormalBits bits (floors), and floor(sqrt(sum of squares)
+/// 2^kNormalGuard), at least one.
 template <class W>
-HWY_INLINE std::array<W, 3> normalise(const GradientStage& s, const std::array<W, 3>& gradient) {
-    const W zero = constant<W>(0);
-    std::array<W, 3> size, normal;
+struct ScaledGradient {
+    std::array<W, 3> size;
+    W length;
+};
+template <class W>
+HWY_INLINE ScaledGradient<W> scaled_gradient(const std::array<W, 3>& gradient) {
+    ScaledGradient<W> scaled;
+    std::array<W, 3>& size = scaled.size;
     for_three([&](std::size_t a) SQUINT_WRITTEN_OUT { size[a] = absolute(gradient[a]); });
     const W largest = max(max(size[0], size[1]), size[2]);
     const W shift = constant<W>(kNormalBits) - bit_length(largest);
     for_three([&](std::size_t a) SQUINT_WRITTEN_OUT {
         size[a] = within(shift_by(size[a], shift), 0, (std::int64_t{1} << kNormalBits) - 1);
     });
-    const W length = max(vector_length(size, kNormalGuard), constant<W>(1));
-    const std::array<W, 3> part = quotients(size, length, s.to_normal);
+    scaled.length = max(vector_length(size, kNormalGuard), constant<W>(1));
+    return scaled;
+}
+
+/// -g / |g| in s1.F, in integers: three exact quotients of a scaled gradient by its length.  Error: 2^-14 from
+/// scaling, where the gradient has more bits, plus half a last bit of the wire.  A zero gradient gives a zero normal.
+template <class W>
+HWY_INLINE std::array<W, 3> normal_of(const GradientStage& s, const std::array<W, 3>& gradient,
+                                      const ScaledGradient<W>& scaled) {
+    const W zero = constant<W>(0);
+    std::array<W, 3> normal;
+    const std::array<W, 3> part = quotients(scaled.size, scaled.length, s.to_normal);
     for_three([&](std::size_t a)
                   SQUINT_WRITTEN_OUT { normal[a] = select(gradient[a] < zero, part[a], zero - part[a]); });
     return normal;
+}
+template <class W>
+HWY_INLINE std::array<W, 3> normalise(const GradientStage& s, const std::array<W, 3>& gradient) {
+    return normal_of(s, gradient, scaled_gradient(gradient));
 }
 
 /// min(1, |g| / g_0) in 1.F, in integers: exactly one where |g| >= g_0.  Relative error: 2^-13 where g_0 has

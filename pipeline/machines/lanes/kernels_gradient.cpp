@@ -92,14 +92,25 @@ void find_gradients(const Plan& plan, int count, lanes::LitSamples& lit) {
     }
 }
 
-/// The second half of stage 3: normals.
+/// The second half of stage 3: normals.  Lengths have a loop of their own, for the same reason.
 template <class L, class F>
 void find_normals(const Plan& plan, int count, lanes::LitSamples& lit) {
     GradientStage stage = plan.gradient;
     F::assume(stage);
+    [[maybe_unused]] lanes::Batch size[3], length;
+    if constexpr (!RealWord<L>)
+        for (int at = 0; at < count; at += static_cast<int>(L::count())) {
+            const ScaledGradient<L> scaled = scaled_gradient(load_three<L>(lit.gradient, at));
+            for (std::size_t a = 0; a < 3; ++a) store(scaled.size[a], size[a].v + at);
+            store(scaled.length, length.v + at);
+        }
     for (int at = 0; at < count; at += static_cast<int>(L::count())) {
         const std::array<L, 3> gradient = load_three<L>(lit.gradient, at);
-        const std::array<L, 3> normal = normalise(stage, gradient);
+        std::array<L, 3> normal;
+        if constexpr (RealWord<L>)
+            normal = normalise(stage, gradient);
+        else
+            normal = normal_of<L>(stage, gradient, {load_three<L>(size, at), load<L>(length.v + at)});
         for (std::size_t a = 0; a < 3; ++a) store(normal[a], lit.normal[a].v + at);
         if (stage.fades) store(confidence(stage, gradient), lit.confidence.v + at);
     }
