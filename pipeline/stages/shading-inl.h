@@ -18,23 +18,33 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
+/// The opacity that highlights of a slab shine with: its own where colours are premultiplied, else one.
+template <class W>
+HWY_INLINE W opacity_of_light(const ShadingStage& s, W alpha) {
+    const int finer = s.finer_than_alpha;
+    return !s.premultiplied ? constant<W>(std::int64_t{1} << s.color_fraction)
+           : finer >= 0     ? shift_left(alpha, finer)
+                            : floor_shift(alpha, -finer);
+}
+/// Makes of a slab's colour what shines by a model's reflection.
+template <class M, class W>
+HWY_INLINE void add_light(M, const ShadingStage& s, const Reflection<W>& light, W opacity,
+                          std::array<W, 3>& color) {
+    for (std::size_t c = 0; c < 3; ++c) {
+        const std::size_t from = light.white ? 0 : c;
+        color[c] = quantise(color[c] * light.diffuse[from] + opacity * light.specular[from], s.to_lit);
+        if constexpr (M::kHeldToOpacity)
+            color[c] = min(color[c], quantise(shift_left(opacity, s.intensity_fraction), s.to_lit));
+    }
+}
+
 /// Lights a slab: returns `color`, straight or premultiplied, lit.  A zero normal gets only ambient light.
 /// Reads `confidence` where light fades in.
 template <class W>
 HWY_INLINE void shade(const ShadingStage& s, const RayWords<W>& ray, const std::array<W, 3>& normal, W alpha,
                       std::array<W, 3>& color, W confidence = constant<W>(0)) {
-    const int finer = s.finer_than_alpha;
-    const W opacity = !s.premultiplied ? constant<W>(std::int64_t{1} << s.color_fraction)
-                      : finer >= 0     ? shift_left(alpha, finer)
-                                       : floor_shift(alpha, -finer);
-    with_model(s.model, [&]<class M>(M model) SQUINT_WRITTEN_OUT {
-        const Reflection<W> light = reflect(model, s, ray, normal, confidence);
-        for (std::size_t c = 0; c < 3; ++c) {
-            const std::size_t from = light.white ? 0 : c;
-            color[c] = quantise(color[c] * light.diffuse[from] + opacity * light.specular[from], s.to_lit);
-            if constexpr (M::kHeldToOpacity)
-                color[c] = min(color[c], quantise(shift_left(opacity, s.intensity_fraction), s.to_lit));
-        }
+    with_model(s.model, [&](auto model) SQUINT_WRITTEN_OUT {
+        add_light(model, s, reflect(model, s, ray, normal, confidence), opacity_of_light(s, alpha), color);
     });
 }
 

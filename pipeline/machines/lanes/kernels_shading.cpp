@@ -17,13 +17,34 @@ HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 namespace {
 
+/// Stage 5 of the default's light, which is white and needs no ray.  Each vector is a chain of operations: in two loops
+/// more of them overlap.
+template <class L>
+void shade_by_default(const Plan& plan, int count, lanes::LitSamples& lit) {
+    ShadingStage shading;  // constants alone are copied, for the facts leave no use for the table
+    static_cast<ShadingConstants&>(shading) = plan.shading;
+    DefaultShading::assume(shading);
+    lanes::Batch diffuse, specular;
+    with_model(shading.model, [&](auto model) SQUINT_WRITTEN_OUT {
+        const L nothing = constant<L>(0);
+        for (int at = 0; at < count; at += static_cast<int>(L::count())) {
+            const Reflection<L> light =
+                reflect(model, shading, RayWords<L>{}, load_three<L>(lit.normal, at), nothing);
+            store(light.diffuse[0], diffuse.v + at), store(light.specular[0], specular.v + at);
+        }
+        for (int at = 0; at < count; at += static_cast<int>(L::count())) {
+            const Reflection<L> light{{load<L>(diffuse.v + at)}, {load<L>(specular.v + at)}, shading.white};
+            std::array<L, 3> color = load_three<L>(lit.color, at);
+            add_light(model, shading, light, opacity_of_light(shading, load<L>(lit.alpha.v + at)), color);
+            for (std::size_t c = 0; c < 3; ++c) store(color[c], lit.color[c].v + at);
+        }
+    });
+}
+
 /// Stage 5.
-template <class L, class F>
+template <class L>
 void shade_samples(const Plan& plan, int count, lanes::LitSamples& lit) {
-    // Constants alone are copied, for the facts leave no use for the table.
-    ShadingStage copy;
-    if constexpr (!F::kNone) static_cast<ShadingConstants&>(copy) = plan.shading, F::assume(copy);
-    const ShadingStage& shading = F::kNone ? plan.shading : copy;
+    const ShadingStage& shading = plan.shading;
     const bool per_ray = shading.needs_ray();
     for (int at = 0; at < count; at += static_cast<int>(L::count())) {
         RayWords<L> ray;
@@ -50,16 +71,15 @@ std::string default_light_missing(const Plan& plan, const lanes::StageWays& ways
 }  // namespace
 
 void shading_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::StageKernels& kernels) {
-    using NoShading = NoFacts<ShadingStage>;
     constexpr KnownRescales kEven = KnownRescales::halves_to_even;
     if (!ways.gradient.is_float) {
         const std::string reason = default_light_missing(plan, ways, kEven);
         kernels.chose(lanes::Segment::light, reason.empty() ? "light.default" : "light", reason);
     }
     lanes::with_word<Lanes, kEven>(ways.shading, [&]<class L>() {
-        kernels.shade = &shade_samples<L, NoShading>;
+        kernels.shade = &shade_samples<L>;
         if constexpr (std::is_same_v<L, Lanes<std::int32_t, kEven>>)
-            if (DefaultShading::hold(plan.shading)) kernels.shade = &shade_samples<L, DefaultShading>;
+            if (DefaultShading::hold(plan.shading)) kernels.shade = &shade_by_default<L>;
     });
 }
 
