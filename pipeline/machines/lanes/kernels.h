@@ -184,6 +184,7 @@ void sampling_kernels(std::int64_t target, const Plan& plan, const StageWays& wa
                       StageKernels& kernels);
 void voxel_kernels(std::int64_t target, const VoxelSource& source, StageKernels& kernels);
 void classification_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);
+void moments_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);
 void point_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels);
 void gradient_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels);
 void shading_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels);

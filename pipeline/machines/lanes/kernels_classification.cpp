@@ -1,4 +1,4 @@
-// Stage 4 in lanes, for every method.
+// Stage 4 in lanes, for methods whose slabs come from rows of tables.
 #include "pipeline/machines/lanes/targets.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -7,8 +7,8 @@
 
 #include "fixedpoint/words/all_lanes-inl.h"
 #include "pipeline/classification/methods-inl.h"
+#include "pipeline/machines/lanes/classify_rows-inl.h"
 #include "pipeline/machines/lanes/kernels.h"
-#include "pipeline/machines/lanes/slabs-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
@@ -31,63 +31,15 @@ HWY_INLINE std::array<std::array<Lanes<float, K>, 4>, 2> prefix_rows(const Power
     return load_two_rows(m.float_rows->data(), row);
 }
 
-namespace {
-
-/// What a method computes of a sample: its input, for most.
-template <class M, class L>
-HWY_INLINE L sample_of(const M&, L input) {
-    return input;
-}
-
-/// `samples` is nothing of the plan: what is stored there changes no constant of the method.
-template <class L, class M>
-void classify_rows(const Plan& plan, int steps, lanes::Samples& __restrict samples) {
-    const M& method = std::get<M>(plan.method);
-    const Unseen<L> unseen(plan);
-    const L zero = constant<L>(0);
-    for (int r = 0; r < lanes::kRays; r += static_cast<int>(L::count())) {
-        L front_input = load<L>(samples.input.v + r);
-        auto front = sample_of(method, front_input);
-        bool has_front = true;
-        for (int row = 0; row < steps; ++row) {
-            const int at = row * lanes::kRays + r;
-            const L back_input =
-                load<L>(samples.input.v + at + (M::kNeedsBack || row + 1 < steps ? lanes::kRays : 0));
-            if (unseen.holds(front_input, M::kNeedsBack ? back_input : front_input)) {
-                store_slab<L>({{zero, zero, zero}, zero}, at, samples);
-                has_front = false;
-            } else {
-                if (!has_front) front = sample_of(method, front_input);
-                const auto back = sample_of(method, back_input);
-                store_slab<L>(classify(method, front, back, load<L>(samples.length.v + at)), at, samples);
-                front = back, has_front = true;
-            }
-            front_input = back_input;
-        }
-    }
-}
-
-}  // namespace
-
 void classification_kernel_of(const Plan& plan, const lanes::StageWay& way, lanes::StageKernels& kernels) {
-    const std::string name = "classify." + std::string(name_of(plan.scene.classification.method));
-    const auto chose = [&](const std::string& kernel, std::string why_not_faster = {}) {
-        kernels.chose(lanes::Segment::classify, kernel, std::move(why_not_faster));
-    };
     std::visit(
-        [&]<class M>([[maybe_unused]] const M& m) {
+        [&]<class M>(const M&) {
             // Entries never meet limits; depths of prefix sums may.
             constexpr KnownRescales kKnown = std::is_same_v<M, PostClassification>
                                                  ? KnownRescales::halves_up
                                                  : KnownRescales::halves_to_even;
-            if constexpr (!std::is_same_v<M, MomentSeries>)  // its float words run in the model
-                if (way.is_float) {
-                    kernels.classify = &classify_rows<Lanes<float>, M>;
-                    return chose(name);
-                }
-            lanes::with_integer_word<Lanes, kKnown>(
-                way, [&]<class L>() { kernels.classify = &classify_rows<L, M>; });
-            chose(name, lanes::why_not_narrow(way, kKnown));
+            if constexpr (!std::is_same_v<M, MomentSeries>)
+                choose_classification<M, kKnown, true>(plan, way, kernels);
         },
         plan.method);
 }

@@ -10,7 +10,6 @@
 #include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/machines/lanes/packing-inl.h"
 #include "pipeline/stages/inside-inl.h"
-#include "pipeline/stages/shading-inl.h"
 
 #include <array>
 #include <variant>
@@ -39,37 +38,6 @@ void find_fades(const Plan& plan, int count, const LitSamples& lit, lanes::SlabL
             for (std::size_t c = 0; c < 4; ++c) store(fades.part[k][c], light.part[k][c].v + at);
     }
 }
-template <class L>
-RayWords<L> stored_ray(const ShadingStage& shading, const LitSamples& lit, int at) {
-    RayWords<L> ray;
-    if (!shading.needs_ray()) return ray;
-    ray.view = load_three<L>(lit.view, at);
-    for (std::size_t l = 0; l < static_cast<std::size_t>(shading.lights); ++l)
-        ray.half[l] = load_three<L>(lit.half[l], at);
-    return ray;
-}
-template <class L>
-void shade_fading_slabs(const Plan& plan, int count, const lanes::SlabLight& light, const LitSamples& far,
-                        LitSamples& lit) {
-    const int parts = plan.inside.rule == InsideRule::linear ? 2 : 4;
-    for (int at = 0; at < count; at += static_cast<int>(L::count())) {
-        FadingNormals<L> ends{{load_three<L>(lit.normal, at), load_three<L>(far.normal, at)},
-                              {constant<L>(0), constant<L>(0)}};
-        if (plan.gradient.fades)
-            ends.certain = {load<L>(lit.confidence.v + at), load<L>(far.confidence.v + at)};
-        share_normal(ends.normal[0], ends.normal[1]);
-        FadingLight<L> fades{parts, {}, constant<L>(0)};
-        for (std::size_t k = 0; k < static_cast<std::size_t>(parts); ++k)
-            for (std::size_t c = 0; c < 4; ++c) fades.part[k][c] = load<L>(light.part[k][c].v + at);
-        std::array<L, 3> color;
-        shade_fading(plan.shading, stored_ray<L>(plan.shading, lit, at), ends.normal, ends.certain, fades,
-                     color);
-        for (std::size_t a = 0; a < 3; ++a) {
-            store(ends.normal[0][a], lit.normal[a].v + at);
-            store(color[a], lit.color[a].v + at);
-        }
-    }
-}
 
 }  // namespace
 
@@ -87,8 +55,6 @@ void fading_kernels_of(const Plan& plan, const lanes::StageWays& ways, lanes::St
             },
             plan.method);
     });
-    lanes::with_word<Lanes, kNothing>(ways.shading,
-                                      [&]<class L>() { kernels.shade_fading = &shade_fading_slabs<L>; });
 }
 
 }  // namespace squint::HWY_NAMESPACE
