@@ -99,7 +99,8 @@ HWY_INLINE CutSlab<W> cut_at_wall(const PrefixLookup& p, W front, W back) {
     W end = back;
     if (p.predicts) {
         const auto ascending = front < back;
-        const W above = floor_shift(front + constant<W>((std::int64_t{1} << bits) - 1), bits);
+        const W above =
+            zero - floor_shift(zero - front, bits);  // the entry at or above, in words with fractions too
         const W wall =
             select(ascending, gather(p.walls, above, 0), gather(p.walls, floor_shift(front, bits), 1));
         const W place = shift_left(wall, bits);

@@ -116,12 +116,10 @@ PrefixLookup build_prefix_lookup(const ClassificationInputs& in, int sub_entry_b
     p.predicts = p.entries.has_opaque && in.settings.opaque_prediction != WallRule::none;
     if (p.predicts) {
         const preintegration::OpaquePrediction prediction = preintegration::predict_opaque(in.entries);
-        // The last row twice: floats may round the next entry from a place before the last one up to one beyond.
-        p.walls = Table(n + 1, 2);
-        for (int i = 0; i <= n; ++i) {
-            const auto at = static_cast<std::size_t>(std::min(i, n - 1));
-            p.walls.set_raw(i, 0, prediction.up[at]);
-            p.walls.set_raw(i, 1, p.as_printed ? -1 : prediction.down[at]);
+        p.walls = Table(n, 2);
+        for (int i = 0; i < n; ++i) {
+            p.walls.set_raw(i, 0, prediction.up[static_cast<std::size_t>(i)]);
+            p.walls.set_raw(i, 1, p.as_printed ? -1 : prediction.down[static_cast<std::size_t>(i)]);
         }
     }
     return p;

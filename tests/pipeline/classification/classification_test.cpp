@@ -293,6 +293,28 @@ TEST(OpaquePrediction, EveryMethodStopsAtTheFirstWall) {
     }
 }
 
+// Words with fractions: the first entry at or above a quarter of a raw unit beyond a wall is the next one.
+TEST(OpaquePrediction, AWallLessThanARawUnitBehindIsNotMet) {
+    Entries entries = pre::cases::constant(256, 0.02, 0.25);
+    pre::cases::make_opaque(entries, 100, {1, 0, 0});
+    for (const MethodCase& method : all_methods()) {
+        if (method.method == Method::pc) continue;
+        const Classifier c = make_classifier(entries, method, "wide");
+        const auto alpha = [&](double beyond, double back) {
+            const auto raw = [&](double entry) { return std::ldexp(entry, c.input_fraction); };
+            return std::ldexp(c.words(Real<double>{raw(100) + beyond}, Real<double>{raw(back)},
+                                      Real<double>{std::ldexp(1, c.length_fraction)})
+                                  .alpha.v,
+                              -c.alpha_fraction);
+        };
+        EXPECT_EQ(alpha(0, 109), 1) << method.name();
+        EXPECT_LT(alpha(0.25, 109), 0.5) << method.name();
+        EXPECT_LT(alpha(-0.25, 91), 0.5) << method.name();
+        EXPECT_EQ(alpha(-0.25, 109), 1) << method.name();
+        EXPECT_EQ(alpha(0.25, 91), 1) << method.name();
+    }
+}
+
 TEST(ClassificationMethods, WithoutAnOpaqueEntryNothingIsPredicted) {
     const Entries entries = pre::cases::ramp(256);
     for (const MethodCase& method : all_methods()) {
