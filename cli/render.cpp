@@ -191,8 +191,7 @@ struct Job {
     const RenderArguments& arguments;
     Scene scene;
     std::shared_ptr<const Volume> volume;
-    std::string output, preview;        // EXR as asked for, or the default; PNG or JPEG
-    std::vector<std::string> warnings;  // of all pictures
+    std::string output, preview;  // EXR as asked for, or the default; PNG or JPEG
 };
 
 /// Writes the exact integral with the scene in its attributes, but no formats: it has none.
@@ -205,8 +204,8 @@ void write_reference(const Job& job, const Plan& plan, const Image& reference, i
 }
 
 /// Renders, writes and reports one picture; returns its record.  `rendering`: of the frame before, whose memory
-/// this one takes.
-Json render_frame(const Job& job, int frame, Rendering& rendering) {
+/// this one takes.  `warned`: what has been warned of; a frame says what is new.
+Json render_frame(const Job& job, int frame, Rendering& rendering, std::vector<std::string>& warned) {
     const RenderArguments& a = job.arguments;
     const Plan plan = plan_asked_for(job.scene, job.volume, frame);
     if (a.bound)
@@ -275,8 +274,9 @@ Json render_frame(const Job& job, int frame, Rendering& rendering) {
     }
     if (!page.empty()) write_text_whole(frame_path(a.profile, frame, frames), page);
     const bool measured = a.error || a.exact || a.reference;
-    std::vector<std::string> warnings = warnings_of(plan, rendering);
-    warnings.insert(warnings.begin(), job.warnings.begin(), job.warnings.end());
+    const std::size_t warned_before = warned.size();
+    for (const std::string& warning : warnings_of(plan, rendering))
+        if (std::find(warned.begin(), warned.end(), warning) == warned.end()) warned.push_back(warning);
     if (!a.quiet) {
         const RenderStatistics& s = rendering.statistics;
         say(fmt::format("{}: {}x{} pixels, {} ({}), {:.2f} s, {} samples on {} rays, {} thread{}\n",
@@ -289,8 +289,8 @@ Json render_frame(const Job& job, int frame, Rendering& rendering) {
                         s.threads == 1 ? "" : "s"));
         if (const std::string refined = text_of(s.refined, s.visited); !refined.empty())
             say(fmt::format("  slabs refined: {} of {}\n", refined, text_of_count(s.visited)));
-        for (const std::string& warning : warnings)
-            say(fmt::format("  warning: {}\n", message_text(warning)));
+        for (std::size_t w = frame == 0 ? 0 : warned_before; w < warned.size(); ++w)
+            say(fmt::format("  warning: {}\n", message_text(warned[w])));
         if (measured) say(error_text(errors));
         if (a.bound) say(bound_text(certificate));
     }
@@ -298,7 +298,7 @@ Json render_frame(const Job& job, int frame, Rendering& rendering) {
     Json record = json_of(plan, rendering, measured ? &errors : nullptr, a.options.audit);
     if (a.bound) record["bound"] = json_of(certificate);
     record["frame"] = frame;
-    if (frame == 0) record["wires"] = json_of_wires(plan), record["warnings"] = warnings;
+    if (frame == 0) record["wires"] = json_of_wires(plan);
     return record;
 }
 
@@ -348,16 +348,16 @@ int run(const RenderArguments& a) {
             scene.precision.preset));
     refuse_beyond(a.max_memory, image_bytes(scene),
                   fmt::format("a picture of {}x{} pixels", scene.image.width, scene.image.height));
-    std::vector<std::string> notes, of_formats;
-    const auto volume = load_and_complete(a.scene, scene, notes, of_formats, a.max_memory, !a.quiet);
-    const Job job{a, scene, volume, output, preview, of_formats};
+    std::vector<std::string> notes, warned;  // of formats first
+    const auto volume = load_and_complete(a.scene, scene, notes, warned, a.max_memory, !a.quiet);
+    const Job job{a, scene, volume, output, preview};
     if (!a.quiet)
         for (const std::string& note : notes) say(fmt::format("  note: {}\n", message_text(note)));
 
     Json pictures = Json::array();
     Rendering rendering;
     for (int frame = 0; frame < scene.camera.turntable; ++frame)
-        pictures.push_back(render_frame(job, frame, rendering));
+        pictures.push_back(render_frame(job, frame, rendering, warned));
     if (scene.camera.turntable > 1 && !a.quiet && !(output.empty() && preview.empty())) say(film_line(job));
     if (a.json.empty()) return kDone;
     Json record{{"schema", "squint.render/2"},
@@ -366,11 +366,10 @@ int run(const RenderArguments& a) {
                 {"volume", json_of(*job.volume)},
                 {"real", rounds_nothing(scene.precision.preset)},
                 {"wires", pictures[0]["wires"]},
-                {"warnings", pictures[0]["warnings"]},
+                {"warnings", warned},
                 {"notes", notes},
                 {"pictures", Json::array()}};
-    for (Json& picture : pictures)
-        picture.erase("wires"), picture.erase("warnings"), record["pictures"].push_back(picture);
+    for (Json& picture : pictures) picture.erase("wires"), record["pictures"].push_back(picture);
     write_json(a.json, record);
     return kDone;
 }
