@@ -338,7 +338,7 @@ void visit_scene(S& scene, V&& visit) {
     visit("precision.budget", scene.precision.budget,
           "auto: the most that roundings may take from any pixel, LSB8, proven");
     visit("precision.guarantee", scene.precision.guarantee,
-          "auto: what the bound is of: the pictures of the command, or every view of the scene (not yet)");
+          "auto: what the bound is of: the pictures of the command, or every view of the scene");
     for (int i = 0; i < kWires; ++i) {
         const auto& wire = kWireInfo[static_cast<std::size_t>(i)];
         visit("precision." + std::string(wire.name), scene.precision.override_[static_cast<std::size_t>(i)],
