@@ -8,8 +8,9 @@
 namespace squint::lanes {
 namespace {
 
-// A cell is built in the time that this many gradients save, with room for slow pages (decision 0094).
-constexpr std::int64_t kGradientsPerCell = 4;
+// Building a cell takes the time that 2 gradients save where its pages have been used before, 25 where they are new to a
+// virtual machine (decision 0094).
+constexpr std::int64_t kGradientsPerCell = 16;
 
 }  // namespace
 
