@@ -24,10 +24,6 @@
 namespace squint {
 namespace {
 
-double last_bit(const Plan& plan, Wire wire) {
-    return std::ldexp(1.0, -plan.specs[wire].format.fraction_bits);
-}
-
 /// kappa and lambda of certificate.h, at their greatest.
 CompositingCosts compositing_costs(const Plan& plan, const LightErrors& light) {
     const CompositingStage& s = plan.compositing;
@@ -262,8 +258,7 @@ std::string why_hopeless(const SceneBound& b, bool lit) {
     if (steep)
         return fmt::format(
             "steep: {}steep cells meet a steep part of the function, and {} pays ({}), so nothing useful "
-            "holds "
-            "for every view{}",
+            "holds for every view{}",
             lit ? "weak gradients turn, or " : "", payer, where,
             lit ? "; a greater shading.gradient_floor may help" : "");
     return fmt::format("{} pays most ({}), and nothing useful holds for every view", payer, where);

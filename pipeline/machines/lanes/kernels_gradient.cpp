@@ -37,8 +37,8 @@ struct StoredNeighbourhood {
 };
 
 #if HWY_TARGET != HWY_SCALAR
-/// A neighbourhood whose central differences fit 16 bits, as its weights do, for the stage is DefaultGradient's: two
-/// a word.
+/// A neighbourhood by its central differences, two a word.  Differences and weights fit 16 bits, for the stage is
+/// DefaultGradient's.
 template <class L>
 struct StoredDifferences {
     const lanes::Batch (&difference)[3][4];

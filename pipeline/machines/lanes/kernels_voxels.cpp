@@ -250,6 +250,7 @@ class CellsBeside {
         }
     }
 
+#if HWY_TARGET != HWY_SCALAR
     /// Stores their differences, as LitSamples::difference has them: along each axis the corners of the cell ahead less
     /// those of the cell behind.
     HWY_INLINE void store_differences(int at, lanes::Batch (&difference)[3][4]) const {
@@ -259,6 +260,7 @@ class CellsBeside {
             for (std::size_t row = 0; row < 4; ++row) hn::Store(words[row], d, difference[a][row].v + at);
         }
     }
+#endif
 
   private:
     HWY_INLINE Words next_to(const Words (&cell)[3], Words middle, int axis, bool ahead) const {
@@ -281,11 +283,8 @@ class CellsBeside {
         else
             return load_quads(there);
     }
+#if HWY_TARGET != HWY_SCALAR
     HWY_INLINE auto corner_differences(const Word* behind, const Word* ahead) const {
-#if HWY_TARGET == HWY_SCALAR
-        (void)ahead;
-        return corners(behind);  // never called
-#else
         return transposed_blocks([&](int lane) {
             const hn::Full128<std::uint16_t> d16;
             const auto eight = [&](const Word* place) {
@@ -297,8 +296,8 @@ class CellsBeside {
             };
             return hn::BitCast(hn::Full128<Word>(), hn::Sub(eight(ahead), eight(behind)));
         });
-#endif
     }
+#endif
 
     const std::uint8_t* cells_;
     CellPlaces places_;

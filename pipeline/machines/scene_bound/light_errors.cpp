@@ -15,9 +15,6 @@ namespace {
 
 constexpr double kRoot3 = 1.7320508075688775;
 
-double last_bit(const Plan& plan, Wire wire) {
-    return std::ldexp(1.0, -plan.specs[wire].format.fraction_bits);
-}
 /// The most that quantising to a wire takes: of what drops bits, and of a quotient or a set-up value.
 double taken_by(const Plan& plan, const Rescale& to, Wire wire) {
     return unit_of(to) * last_bit(plan, wire);

@@ -4,8 +4,11 @@
 //
 //     kd min(|v|, sum of tint (-v.L)+)  and  ks min(|v|, sum of tint |v| ((-v.H)+ / |v|)^p)
 //
-// to ambient light.  Both are Lipschitz in v: the first by the sum of tints, T; the second by T sqrt(p) (p / (p + 1))^((p -
-// 1) / 2), the greatest length of the slope of |v| cos^p.  v itself changes by at most the change of g over max(|g|, g_0).
+// to ambient light.  Both are Lipschitz in v: the first by the sum of tints, T; the second by T L_p, with
+//
+//     L_p = sqrt(p) (p / (p + 1))^((p - 1) / 2),
+//
+// the greatest slope of |v| cos^p.  v itself changes by at most the change of g over max(|g|, g_0).
 #pragma once
 
 #include "fixedpoint/words/bounded.h"

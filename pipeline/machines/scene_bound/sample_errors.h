@@ -5,8 +5,14 @@
 #include "pipeline/plan/plan.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace squint {
+
+/// The last bit of a wire, of 1.0.
+inline double last_bit(const Plan& plan, Wire wire) {
+    return std::ldexp(1.0, -plan.specs[wire].format.fraction_bits);
+}
 
 /// The values of a cell: its eight corners, and the sum over the axes of its steepest edges, in levels.  Of lit scenes,
 /// the most that v = g / max(|g|, g_0) changes by as the point does, a voxel, and as g does (light_errors.h).
