@@ -110,7 +110,8 @@ bool quantise_rows(std::span<const double> values, std::span<const double> scale
                                               words);
 }
 
-Table::Table(int rows, int columns, bool keeps_exact) : columns_(columns), data_(std::make_shared<Data>()) {
+Table::Table(int rows, int columns, bool keeps_exact)
+    : rows_(rows), columns_(columns), data_(std::make_shared<Data>()) {
     data_->size = static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns);
     if (keeps_exact) data_->exact.assign(data_->size, 0);
 }

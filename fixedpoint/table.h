@@ -27,7 +27,7 @@ class Table {
 
     int wire_of(int column) const { return last_wire && column == columns_ - 1 ? *last_wire : wire; }
     int columns() const { return columns_; }
-    int rows() const { return data_ ? static_cast<int>(data_->size) / columns_ : 0; }
+    int rows() const { return rows_; }
     std::size_t index(std::int64_t row, int column) const {
         return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
                static_cast<std::size_t>(column);
@@ -72,7 +72,7 @@ class Table {
         if (has_exact()) data_->exact[index(row, column)] = value * static_cast<double>(format.one());
     }
     /// Shares the rows and exact values of a table that was built in the same way.
-    void share(const Table& other) { data_ = other.data_; }
+    void share(const Table& other) { rows_ = other.rows_, data_ = other.data_; }
 
   private:
     struct Data {
@@ -85,7 +85,7 @@ class Table {
     };
     void put(std::size_t at, double exact_raw, std::int64_t raw);
     void widen();
-    int columns_ = 1;
+    int rows_ = 0, columns_ = 1;
     std::shared_ptr<Data> data_;
 };
 

@@ -16,6 +16,19 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
+/// The numbers of lanes one by one, for addresses: 0 or more, so that unsigned words widen at no cost.
+class LaneNumbers {
+  public:
+    HWY_INLINE explicit LaneNumbers(hn::Vec<hn::ScalableTag<std::int32_t>> numbers) {
+        const hn::ScalableTag<std::uint32_t> d;
+        hn::Store(hn::BitCast(d, numbers), d, at_);
+    }
+    HWY_INLINE std::size_t operator[](int lane) const { return at_[lane]; }
+
+  private:
+    alignas(64) std::uint32_t at_[HWY_LANES(std::uint32_t)];
+};
+
 template <KnownRescales K>
 HWY_INLINE Lanes<std::int32_t, K> gather(const Table& table, Lanes<std::int32_t, K> row, int column) {
     const hn::ScalableTag<std::int32_t> d;
@@ -75,8 +88,7 @@ template <KnownRescales K>
 HWY_INLINE std::array<Lanes<std::int32_t, K>, 2> load_pair_of_rows(const Table& table,
                                                                    Lanes<std::int32_t, K> row) {
     assert(table.columns() == 1);
-    alignas(64) std::int32_t at[HWY_LANES(std::int32_t)];
-    hn::Store(row.v, hn::ScalableTag<std::int32_t>(), at);
+    const LaneNumbers at(row.v);
     const std::int32_t* words = table.narrow();
     const auto pairs = load_pairs([&](int lane) { return words + at[lane]; });
     return {Lanes<std::int32_t, K>{pairs[0]}, Lanes<std::int32_t, K>{pairs[1]}};
@@ -191,11 +203,9 @@ HWY_INLINE auto load_widened_quads(Address&& address) {
 template <KnownRescales K>
 HWY_INLINE std::array<std::array<Lanes<std::int32_t, K>, 4>, 2> load_neighbours(
     const void* base, Lanes<std::int32_t, K> position) {
-    const hn::ScalableTag<std::int32_t> d;
-    alignas(64) std::int32_t at[HWY_LANES(std::int32_t)];
-    hn::Store(position.v, d, at);
+    const LaneNumbers at(position.v);
     const auto* bytes = static_cast<const std::uint8_t*>(base);
-    const auto words = load_quads([&](int lane) { return bytes + std::int64_t{8} * at[lane]; });
+    const auto words = load_quads([&](int lane) { return bytes + 8 * at[lane]; });
     const auto first = halves_of<K>(words[0]), second = halves_of<K>(words[1]),
                third = halves_of<K>(words[2]), fourth = halves_of<K>(words[3]);
     return {{{first[0], first[1], second[0], second[1]}, {third[0], third[1], fourth[0], fourth[1]}}};
@@ -249,22 +259,20 @@ HWY_INLINE std::array<std::array<Lanes<std::int32_t, K>, 2>, 2> load_two_by_two(
                                                                                 Lanes<std::int32_t, K> row) {
     assert(table.columns() == 2);
     using L = Lanes<std::int32_t, K>;
-    alignas(64) std::int32_t at[HWY_LANES(std::int32_t)];
-    hn::Store(row.v, hn::ScalableTag<std::int32_t>(), at);
+    const LaneNumbers at(row.v);
     const std::int32_t* words = table.narrow();
-    const auto both = load_quads([&](int lane) { return words + std::int64_t{2} * at[lane]; });
+    const auto both = load_quads([&](int lane) { return words + 2 * at[lane]; });
     return {{{L{both[0]}, L{both[1]}}, {L{both[2]}, L{both[3]}}}};
 }
 /// Rows `row` and `row + 1` of a table with four columns.
 template <KnownRescales K>
 HWY_INLINE std::array<std::array<Lanes<std::int32_t, K>, 4>, 2> load_two_rows(const std::int32_t* rows,
                                                                               Lanes<std::int32_t, K> row) {
-    const hn::ScalableTag<std::int32_t> d;
     using L = Lanes<std::int32_t, K>;
-    alignas(64) std::int32_t at[HWY_LANES(std::int32_t)];
-    hn::Store(row.v, d, at);
-    const auto a = load_quads([&](int lane) { return rows + std::int64_t{4} * at[lane]; });
-    const auto b = load_quads([&](int lane) { return rows + std::int64_t{4} * at[lane] + 4; });
+    const LaneNumbers byte(hn::ShiftLeft<4>(row.v));
+    const auto* bytes = reinterpret_cast<const std::uint8_t*>(rows);
+    const auto a = load_quads([&](int lane) { return bytes + byte[lane]; });
+    const auto b = load_quads([&](int lane) { return bytes + byte[lane] + 16; });
     return {{{L{a[0]}, L{a[1]}, L{a[2]}, L{a[3]}}, {L{b[0]}, L{b[1]}, L{b[2]}, L{b[3]}}}};
 }
 /// Interpolates between rows `row` and `row + 1` of four columns: paired rows (Table::paired), weights of at
@@ -275,11 +283,9 @@ HWY_INLINE std::array<Lanes<std::int32_t, K>, 4> lerp_paired_rows(const std::int
                                                                   Lanes<std::int32_t, K> weight,
                                                                   int weight_bits, const Rescale& to_color,
                                                                   const Rescale& to_alpha) {
-    const hn::ScalableTag<std::int32_t> d;
-    alignas(64) std::int32_t at[HWY_LANES(std::int32_t)];  // byte offsets
-    hn::Store(hn::ShiftLeft<4>(row.v), d, at);
+    const LaneNumbers byte(hn::ShiftLeft<4>(row.v));
     const auto* bytes = reinterpret_cast<const std::uint8_t*>(paired);
-    const auto pairs = load_quads([&](int lane) { return bytes + at[lane]; });
+    const auto pairs = load_quads([&](int lane) { return bytes + byte[lane]; });
     const auto weights = pair_weights(weight.v, weight_bits);
     const std::int32_t offset = 1 << (weight_bits + 15);
     return {blend_pairs<K>(pairs[0], weights, offset, to_color),
