@@ -29,38 +29,27 @@ HWY_INLINE std::array<std::array<W, 4>, 2> prefix_rows(const PowerSeriesOfOrder1
 template <class W>
 struct PrefixSample {
     W input;
-    EntryPosition<W> at;           // in rows of T
-    std::array<W, 4> sums, rises;  // T and X1 at the row, and their rise to the next
-    Wide<W> bend;                  // what the bend of T takes from it
+    std::array<PrefixPlace<W>, 4> sums;  // T and X1
+    Wide<W> bend;                        // what the bend of T takes from it
 };
 template <class W>
 HWY_INLINE PrefixSample<W> sample_of(const PowerSeriesOfOrder1& m, W input) {
-    PrefixSample<W> s{
-        input, sub_entry_position(m.prefix.entries, m.prefix.sub_entry_bits, input), {}, {}, {}};
-    s.at.fraction = within(s.at.fraction, 0, std::int64_t{1} << m.prefix.place_bits());
-    const std::array<std::array<W, 4>, 2> rows = prefix_rows(m, s.at.entry);
-    s.sums = rows[0];
-    const auto rise = [&](std::size_t c)
-                          SQUINT_WRITTEN_OUT { return within(rows[1][c] - rows[0][c], 0, m.most_rise); };
-    s.rises = {rise(0), rise(1), rise(2), rise(3)};
-    if (m.prefix.curved) s.bend = bend_at(m.prefix, s.at);
+    const EntryPosition<W> at = sub_entry_position(m.prefix.entries, m.prefix.sub_entry_bits, input);
+    const std::array<std::array<W, 4>, 2> rows = prefix_rows(m, at.entry);
+    const auto place = [&](std::size_t c) SQUINT_WRITTEN_OUT {
+        return prefix_place(rows[0][c], rows[1][c], at.fraction, m.prefix.place_bits(), m.most_rise);
+    };
+    PrefixSample<W> s{input, {place(0), place(1), place(2), place(3)}, {}};
+    if (m.prefix.curved) s.bend = bend_at(m.prefix, at);
     return s;
 }
 
-/// The difference of a prefix sum between two samples, exact: it has place_bits() more fraction bits
-/// than the sum's words.
-template <class W>
-HWY_INLINE Wide<W> prefix_difference(const PrefixSample<W>& front, const PrefixSample<W>& back,
-                                     std::size_t column, int place_bits) {
-    return wide_sum(back.sums[column] - front.sums[column], place_bits,
-                    back.at.fraction * back.rises[column] - front.at.fraction * front.rises[column]);
-}
 /// Classifies the slab up to its end, whether a wall cuts it or not.
 template <class W>
 HWY_INLINE Slab<W> classify(const PowerSeriesOfOrder1& m, const PrefixSample<W>& front,
                             const PrefixSample<W>& end, const CutSlab<W>& cut, W length) {
     const int bits = m.prefix.place_bits();
-    const Wide<W> straight = prefix_difference(front, end, 0, bits);
+    const Wide<W> straight = prefix_difference(front.sums[0], end.sums[0], bits);
     Wide<W> depth = straight;
     if (m.prefix.curved) depth = shift_left(straight, bits + 1) - (end.bend - front.bend);
     depth = absolute(depth);
@@ -72,7 +61,7 @@ HWY_INLINE Slab<W> classify(const PowerSeriesOfOrder1& m, const PrefixSample<W>&
     if (any(zero < slab.alpha)) {  // an invisible slab may have any colour
         const Wide<W> some = divisor<W>(absolute(straight));
         const auto colored = [&](std::size_t c) SQUINT_WRITTEN_OUT {
-            return absolute(prefix_difference(front, end, c + 1, bits));
+            return absolute(prefix_difference(front.sums[c + 1], end.sums[c + 1], bits));
         };
         slab.color =
             divide_three(std::array<Wide<W>, 3>{colored(0), colored(1), colored(2)}, some, m.to_ratio);
