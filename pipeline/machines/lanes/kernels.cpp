@@ -47,6 +47,7 @@ StageKernels kernels_for(const Plan& plan, const StageWays& ways, const VoxelSou
     ray_kernels(target, kernels);
     sampling_kernels(target, plan, ways, source, kernels);
     voxel_kernels(target, source, kernels);
+    lit_voxel_kernels(target, source, kernels);
     classification_kernel(target, plan, ways.classification, kernels);
     moments_kernel(target, plan, ways.classification, kernels);
     point_kernels(target, plan, ways, kernels);

@@ -183,6 +183,7 @@ void ray_kernels(std::int64_t target, StageKernels& kernels);
 void sampling_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, const VoxelSource& source,
                       StageKernels& kernels);
 void voxel_kernels(std::int64_t target, const VoxelSource& source, StageKernels& kernels);
+void lit_voxel_kernels(std::int64_t target, const VoxelSource& source, StageKernels& kernels);
 void classification_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);
 void moments_kernel(std::int64_t target, const Plan& plan, const StageWay& way, StageKernels& kernels);
 void point_kernels(std::int64_t target, const Plan& plan, const StageWays& ways, StageKernels& kernels);
