@@ -56,21 +56,12 @@ BlockBox blocks_met(const Plan& plan) {
 bool may_be_met(const BlockBox& box, const EmptySpace* empty, const Index3& cell_blocks, std::int64_t block,
                 int apart) {
     constexpr int kBits = CellBlocks::kBits - kBlockBits;
-    static_assert(kBits >= 0);
+    static_assert(kBits == 1);  // so that its middle is a corner of all its blocks
     const Index3 at(block % cell_blocks.x, block / cell_blocks.x % cell_blocks.y,
                     block / (cell_blocks.x * cell_blocks.y));
-    Index3 low, end;
-    for (int a = 0; a < 3; ++a) {
-        low[a] = std::max(at[a] << kBits, box.low[a]);
-        end[a] = std::min((at[a] + 1) << kBits, box.low[a] + box.blocks[a]);
-        if (low[a] >= end[a]) return false;
-    }
-    if (!empty) return true;
-    for (auto z = low.z; z < end.z; ++z)
-        for (auto y = low.y; y < end.y; ++y)
-            for (auto x = low.x; x < end.x; ++x)
-                if (empty->at(x, y, z) <= apart) return true;
-    return false;
+    for (int a = 0; a < 3; ++a)
+        if ((at[a] + 1) << kBits <= box.low[a] || at[a] << kBits >= box.low[a] + box.blocks[a]) return false;
+    return !empty || empty->clear_at(2 * at.x + 1, 2 * at.y + 1, 2 * at.z + 1) <= apart;
 }
 
 bool may_skip(const Plan& plan) {
@@ -85,7 +76,7 @@ std::int64_t room_of(const RenderOptions& options) {
 std::shared_ptr<const EmptySpace> empty_space_of(const Plan& plan, std::int64_t room) {
     if (!may_skip(plan)) return nullptr;
     const BlockBox box = blocks_met(plan);
-    if (EmptySpace::bytes_for(box) > room) return nullptr;
+    if (EmptySpace::bytes_for(*plan.volume, box) > room) return nullptr;
     return kept_empty_space(*plan.volume, box, plan.entries, slab_reach(plan), plan.entry_reach,
                             plan.projection_mode);
 }

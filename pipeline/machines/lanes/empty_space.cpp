@@ -15,11 +15,12 @@ namespace {
 
 // The ranges of the blocks along x at y, z of the box.
 template <class T>
-void measure_row(const Volume& volume, BlockRanges& ranges, std::int64_t y, std::int64_t z) {
+void measure_row(const Volume& volume, const BlockBox& box, BlockRanges::Of<T>& ranges, std::int64_t y,
+                 std::int64_t z) {
     const T* data = static_cast<const T*>(volume.data.get());
-    const Index3 n = volume.dims, &low = ranges.box.low, &blocks = ranges.box.blocks;
-    std::uint16_t* smallest = ranges.smallest.data() + (z * blocks.y + y) * blocks.x;
-    std::uint16_t* largest = ranges.largest.data() + (z * blocks.y + y) * blocks.x;
+    const Index3 n = volume.dims, &low = box.low, &blocks = box.blocks;
+    T* smallest = ranges.smallest.data() + (z * blocks.y + y) * blocks.x;
+    T* largest = ranges.largest.data() + (z * blocks.y + y) * blocks.x;
     // Fold the voxels of each line onto its blocks; a block's last voxel is its neighbour's first.
     const auto first = [](std::int64_t block) { return block * kBlock; };
     const auto last = [](std::int64_t block, std::int64_t voxels) {
@@ -40,35 +41,37 @@ void measure_row(const Volume& volume, BlockRanges& ranges, std::int64_t y, std:
                 T least = row[x0], greatest = row[x0];
                 for (std::int64_t i = x0 + 1; i <= x1; ++i)
                     least = std::min(least, row[i]), greatest = std::max(greatest, row[i]);
-                smallest[x] = std::min<std::uint16_t>(smallest[x], least);
-                largest[x] = std::max<std::uint16_t>(largest[x], greatest);
+                smallest[x] = std::min(smallest[x], least);
+                largest[x] = std::max(largest[x], greatest);
             }
         }
-    if (zeros) std::fill_n(smallest, blocks.x, std::uint16_t{0});
+    if (zeros) std::fill_n(smallest, blocks.x, T{0});
 }
 
-// The Chebyshev distance to the nearest zero is one more than the least among a block's 26 neighbours: 13 of
-// them are visited on the way forth and 13 on the way back.
-void spread(std::vector<std::uint8_t>& distance, const Index3& blocks) {
-    const auto nx = static_cast<std::size_t>(blocks.x);
-    // The rows already passed, with a block more on either side.
-    std::vector<std::uint8_t> nearest(nx + 2);
-    const auto pass = [&](bool forth) {
+// The Chebyshev distance to the nearest zero is one more than the least among 26 neighbours: 13 of them are
+// visited on the way forth and 13 on the way back.
+void spread(std::vector<std::uint8_t>& distance, const Index3& n) {
+    const auto nx = static_cast<std::size_t>(n.x);
+    // The rows already passed, with a place more on either side.
+    std::vector<std::uint8_t> rows_passed(nx + 2);
+    std::uint8_t* const nearest = rows_passed.data();
+    // By value: for all that a compiler knows, a byte that is stored may be one of theirs.
+    const auto pass = [&, nx, nearest](bool forth) {
         const std::int64_t before = forth ? -1 : 1;
         const auto at = [&](std::int64_t i, std::int64_t count) { return forth ? i : count - 1 - i; };
-        for (std::int64_t k = 0; k < blocks.z; ++k)
-            for (std::int64_t j = 0; j < blocks.y; ++j) {
-                const std::int64_t z = at(k, blocks.z), y = at(j, blocks.y);
+        for (std::int64_t k = 0; k < n.z; ++k)
+            for (std::int64_t j = 0; j < n.y; ++j) {
+                const std::int64_t z = at(k, n.z), y = at(j, n.y);
                 const auto row = [&](std::int64_t dy, std::int64_t dz) -> std::uint8_t* {
-                    const bool inside = y + dy >= 0 && y + dy < blocks.y && z + dz >= 0 && z + dz < blocks.z;
-                    return inside ? distance.data() + ((z + dz) * blocks.y + y + dy) * blocks.x : nullptr;
+                    const bool inside = y + dy >= 0 && y + dy < n.y && z + dz >= 0 && z + dz < n.z;
+                    return inside ? distance.data() + ((z + dz) * n.y + y + dy) * n.x : nullptr;
                 };
-                std::fill(nearest.begin(), nearest.end(), std::uint8_t{254});
+                std::fill_n(nearest, nx + 2, std::uint8_t{254});
                 for (const std::uint8_t* passed :
                      {row(before, 0), row(-1, before), row(0, before), row(1, before)})
                     for (std::size_t x = 0; passed && x < nx; ++x)
                         nearest[x + 1] = std::min(nearest[x + 1], passed[x]);
-                std::uint8_t* here = row(0, 0);
+                std::uint8_t* const here = row(0, 0);
                 for (std::size_t x = 0; x < nx; ++x) {
                     const std::uint8_t around =
                         std::min(nearest[x], std::min(nearest[x + 1], nearest[x + 2]));
@@ -85,41 +88,45 @@ void spread(std::vector<std::uint8_t>& distance, const Index3& blocks) {
     pass(true), pass(false);
 }
 
-// At each corner of blocks, the least distance of the eight blocks around it.
-void clear_corners(EmptySpace& space) {
+// So many blocks stand between a corner and the nearest that can be seen as there are steps from the corner to
+// one of that block's own.
+void find_clear(EmptySpace& space) {
     const Index3 blocks = space.box.blocks, n = blocks + Index3(1);
-    const auto count = static_cast<std::size_t>(n.x * n.y * n.z);
+    const auto count = static_cast<std::size_t>(n.x * n.y * n.z), nx = static_cast<std::size_t>(blocks.x);
     space.corners = n;
     space.clear.reserve(count + 3);  // lanes read four bytes at any of them
-    space.clear.assign(count, 255);
+    space.clear.resize(count);
     tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
+        // Of the blocks about a row of corners, one more on either side; so far their bits are 0 or 1.
+        std::vector<std::uint8_t> about(nx + 2);
+        std::uint8_t* const seen = about.data();
         for (std::int64_t y = 0; y < n.y; ++y) {
-            std::uint8_t* here = space.clear.data() + (z * n.y + y) * n.x;
+            std::fill_n(seen, nx + 2, std::uint8_t{0});
             for (const std::int64_t k : {z - 1, z})
                 for (const std::int64_t j : {y - 1, y}) {
                     if (k < 0 || k >= blocks.z || j < 0 || j >= blocks.y) continue;
-                    const std::uint8_t* row = space.distance.data() + (k * blocks.y + j) * blocks.x;
-                    for (std::int64_t x = 0; x < blocks.x; ++x) {
-                        here[x] = std::min(here[x], row[x]);
-                        here[x + 1] = std::min(here[x + 1], row[x]);
-                    }
+                    const std::uint8_t* row = space.spans.data() + (k * blocks.y + j) * blocks.x;
+                    for (std::size_t x = 0; x < nx; ++x) seen[x + 1] |= row[x];
                 }
+            std::uint8_t* here = space.clear.data() + (z * n.y + y) * n.x;
+            for (std::size_t x = 0; x <= nx; ++x)
+                here[x] = static_cast<std::uint8_t>((seen[x] | seen[x + 1]) - 1);
         }
     });
+    spread(space.clear, n);
 }
 
+// Of each block's bits, from the first.
 void find_spans(EmptySpace& space) {
     const Index3 n = space.box.blocks;
-    const auto nx = static_cast<std::size_t>(n.x), count = static_cast<std::size_t>(n.x * n.y * n.z);
-    space.spans.reserve(count + 3);  // lanes read four bytes at any of them
-    space.spans.assign(count, 0);
-    tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
+    const auto nx = static_cast<std::size_t>(n.x);
+    const auto slice = [&](std::int64_t z) {
         // Two bits of a block of a row: whether it, and whether it or the next, can be seen.
         const auto see = [&](std::int64_t y, std::int64_t k, std::vector<std::uint8_t>& row) {
             std::fill(row.begin(), row.end(), std::uint8_t{0});
             if (y >= n.y || k >= n.z) return;
-            const std::uint8_t* distance = space.distance.data() + (k * n.y + y) * n.x;
-            for (std::size_t x = 0; x < nx; ++x) row[x] = distance[x] == 0 ? 3 : 0;
+            const std::uint8_t* spans = space.spans.data() + (k * n.y + y) * n.x;
+            for (std::size_t x = 0; x < nx; ++x) row[x] = static_cast<std::uint8_t>(3 * (spans[x] & 1));
             for (std::size_t x = 0; x + 1 < nx; ++x)
                 row[x] = static_cast<std::uint8_t>(row[x] | (row[x + 1] & 2));
         };
@@ -135,42 +142,30 @@ void find_spans(EmptySpace& space) {
                                                      (along_y | along_z | next_above[x]) << 6);
             }
         }
-    });
+    };
+    // A slice reads the next, which none may write meanwhile.
+    for (const std::int64_t odd : {std::int64_t{0}, std::int64_t{1}})
+        tbb::parallel_for(odd, n.z, std::int64_t{2}, slice);
 }
 
-// The range of each block and its 26 neighbours, axis by axis.
-void widen(BlockRanges& ranges) {
-    const Index3 n = ranges.box.blocks;
-    const auto pass = [&](std::int64_t stride, std::int64_t count) {
-        const BlockRanges old = ranges;
-        tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
-            for (std::int64_t i = z * n.x * n.y; i < (z + 1) * n.x * n.y; ++i) {
-                const std::int64_t place = i / stride % count;
-                const auto at = static_cast<std::size_t>(i);
-                for (const std::int64_t step : {std::int64_t{-1}, std::int64_t{1}}) {
-                    if (place + step < 0 || place + step >= count) continue;
-                    const auto other = static_cast<std::size_t>(i + step * stride);
-                    ranges.smallest[at] = std::min(ranges.smallest[at], old.smallest[other]);
-                    ranges.largest[at] = std::max(ranges.largest[at], old.largest[other]);
-                }
-            }
-        });
-    };
-    pass(1, n.x), pass(n.x, n.y), pass(n.x * n.y, n.z);
+template <class T>
+BlockRanges::Of<T> measure_all(const Volume& volume, const BlockBox& box) {
+    const auto count = static_cast<std::size_t>(box.count());
+    BlockRanges::Of<T> ranges;
+    ranges.smallest.assign(count, std::numeric_limits<T>::max()), ranges.largest.assign(count, 0);
+    tbb::parallel_for(std::int64_t{0}, box.blocks.z, [&](std::int64_t z) {
+        for (std::int64_t y = 0; y < box.blocks.y; ++y) measure_row<T>(volume, box, ranges, y, z);
+    });
+    return ranges;
 }
 
 std::shared_ptr<BlockRanges> measure(const Volume& volume, const BlockBox& box) {
     auto ranges = std::make_shared<BlockRanges>();
     ranges->box = box;
-    const auto count = static_cast<std::size_t>(box.count());
-    ranges->smallest.assign(count, 0xffff), ranges->largest.assign(count, 0);
-    tbb::parallel_for(std::int64_t{0}, box.blocks.z, [&](std::int64_t z) {
-        for (std::int64_t y = 0; y < box.blocks.y; ++y)
-            if (volume.type == ScalarType::u8)
-                measure_row<std::uint8_t>(volume, *ranges, y, z);
-            else
-                measure_row<std::uint16_t>(volume, *ranges, y, z);
-    });
+    if (volume.type == ScalarType::u8)
+        ranges->of = measure_all<std::uint8_t>(volume, box);
+    else
+        ranges->of = measure_all<std::uint16_t>(volume, box);
     return ranges;
 }
 
@@ -201,6 +196,58 @@ class SeenRanges {
   private:
     std::vector<int> before_from_, before_to_;  // visible entries that a range from or to a scalar may reach
 };
+
+// What `choose` leaves of each block of slice z and all up to `reach` blocks away, axis by axis.
+template <class T, class Choose>
+std::vector<T> widened(const std::vector<T>& blocks, const Index3& n, std::int64_t z, std::int64_t reach,
+                       Choose&& choose) {
+    // Of `count` runs of so many blocks, those about one of them.
+    const auto join = [&](const T* runs, std::int64_t run, std::int64_t count, std::int64_t at, T* joined) {
+        const std::int64_t first = std::max(at - reach, std::int64_t{0}),
+                           last = std::min(at + reach, count - 1);
+        std::copy_n(runs + first * run, run, joined);
+        for (std::int64_t i = first + 1; i <= last; ++i)
+            for (std::int64_t k = 0; k < run; ++k) joined[k] = choose(joined[k], runs[i * run + k]);
+    };
+    std::vector<T> slice(static_cast<std::size_t>(n.x * n.y)), along_z(slice.size()),
+        row(static_cast<std::size_t>(n.x));
+    join(blocks.data(), n.x * n.y, n.z, z, along_z.data());
+    for (std::int64_t y = 0; y < n.y; ++y) {
+        join(along_z.data(), n.x, n.y, y, row.data());
+        for (std::int64_t x = 0; x < n.x; ++x) join(row.data(), 1, n.x, x, slice.data() + y * n.x + x);
+    }
+    return slice;
+}
+
+// Bit 0 of EmptySpace::spans.
+template <class T>
+void find_visible(const BlockRanges::Of<T>& ranges, const SeenRanges& can_be_seen, int reach, bool from_zero,
+                  EmptySpace& space) {
+    const Index3 n = space.box.blocks;
+    const auto count = static_cast<std::size_t>(space.box.count());
+    space.spans.reserve(count + 3);  // lanes read four bytes at any of them
+    space.spans.resize(count);
+    std::atomic<std::int64_t> visible{0};
+    tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
+        const std::int64_t blocks = n.x * n.y;
+        const T* smallest = ranges.smallest.data() + z * blocks;
+        const T* largest = ranges.largest.data() + z * blocks;
+        std::vector<T> least, most;
+        if (reach > 0) {
+            least = widened(ranges.smallest, n, z, reach, [](T a, T b) { return std::min(a, b); });
+            most = widened(ranges.largest, n, z, reach, [](T a, T b) { return std::max(a, b); });
+            smallest = least.data(), largest = most.data();
+        }
+        std::uint8_t* spans = space.spans.data() + z * blocks;
+        std::int64_t here = 0;
+        for (std::int64_t i = 0; i < blocks; ++i) {
+            spans[i] = can_be_seen(from_zero ? T{0} : smallest[i], largest[i]);
+            here += spans[i];
+        }
+        visible += here;
+    });
+    space.visible_blocks = visible;
+}
 
 /// Which blocks of half a side can be seen: a byte each, x fastest.
 template <class T>
@@ -244,8 +291,7 @@ std::vector<std::uint8_t> seen_in_halves(const Volume& volume, const SeenRanges&
     tbb::parallel_for(std::int64_t{0}, blocks.z, [&](std::int64_t z) {
         for (std::int64_t y = 0; y < blocks.y; ++y)
             for (std::int64_t x = 0; x < blocks.x; ++x)
-                if (space.distance[static_cast<std::size_t>((z * blocks.y + y) * blocks.x + x)] == 0)
-                    look(Index3(x, y, z));
+                if (space.visible(low.x + x, low.y + y, low.z + z)) look(Index3(x, y, z));
     });
     return seen;
 }
@@ -272,31 +318,17 @@ std::shared_ptr<const BlockRanges> block_ranges(const Volume& volume, const Bloc
         [&](const BlockRanges& ranges) { return ranges.box.holds(box); });
 }
 
-EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, int reach, int entry_reach) {
-    std::uint16_t greatest = 0;
-    for (const std::uint16_t scalar : ranges.largest) greatest = std::max(greatest, scalar);
-    const SeenRanges can_be_seen(entries, greatest, entry_reach);
-
-    BlockRanges widened;
-    if (reach > 0) widened = ranges;
-    for (int i = 0; i < reach; ++i) widen(widened);
-    const BlockRanges& seen = reach > 0 ? widened : ranges;
+EmptySpace find_empty_space(const BlockRanges& ranges, const Entries& entries, int reach, int entry_reach,
+                            bool from_zero) {
     EmptySpace space;
     space.box = ranges.box;
-    const Index3 n = space.box.blocks;
-    space.distance.assign(ranges.smallest.size(), 255);
-    std::atomic<std::int64_t> visible{0};
-    tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
-        std::int64_t here = 0;
-        for (std::int64_t i = z * n.x * n.y; i < (z + 1) * n.x * n.y; ++i) {
-            const auto at = static_cast<std::size_t>(i);
-            if (can_be_seen(seen.smallest[at], seen.largest[at])) space.distance[at] = 0, ++here;
-        }
-        visible += here;
-    });
-    space.visible_blocks = visible;
-    spread(space.distance, n);
-    clear_corners(space);
+    std::visit(
+        [&](const auto& of) {
+            const auto greatest = *std::max_element(of.largest.begin(), of.largest.end());
+            find_visible(of, SeenRanges(entries, greatest, entry_reach), reach, from_zero, space);
+        },
+        ranges.of);
+    find_clear(space);
     find_spans(space);
     return space;
 }

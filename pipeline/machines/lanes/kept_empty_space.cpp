@@ -2,8 +2,6 @@
 
 #include "pipeline/kept.h"
 
-#include <algorithm>
-
 namespace squint::lanes {
 namespace {
 
@@ -20,11 +18,6 @@ struct Keyed {
     EmptySpace space;
 };
 
-BlockRanges lowered(BlockRanges ranges) {
-    std::fill(ranges.smallest.begin(), ranges.smallest.end(), std::uint16_t{0});
-    return ranges;
-}
-
 }  // namespace
 
 std::shared_ptr<const EmptySpace> kept_empty_space(const Volume& volume, const BlockBox& box,
@@ -35,10 +28,8 @@ std::shared_ptr<const EmptySpace> kept_empty_space(const Volume& volume, const B
     for (const Entry& entry : entries.entry) key.visible.push_back(entry.is_visible());
     const auto make = [&] {
         const std::shared_ptr<const BlockRanges> ranges = block_ranges(volume, box);
-        const auto find = [&](const BlockRanges& r) {
-            return find_empty_space(r, entries, reach, entry_reach);
-        };
-        auto keyed = std::make_shared<Keyed>(Keyed{key, from_zero ? find(lowered(*ranges)) : find(*ranges)});
+        auto keyed = std::make_shared<Keyed>(
+            Keyed{key, find_empty_space(*ranges, entries, reach, entry_reach, from_zero)});
         if (reach == 0 && entry_reach == 0 && !from_zero) look_again(volume, entries, keyed->space);
         return keyed;
     };

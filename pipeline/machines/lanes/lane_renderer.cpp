@@ -121,7 +121,7 @@ void build_cells(const std::shared_ptr<CellBlocks>& cells, const Volume& volume,
 
 // Whether rays may meet something that cannot be seen.
 bool hides_something(const EmptySpace& space) {
-    const auto blocks = static_cast<std::int64_t>(space.distance.size());
+    const std::int64_t blocks = space.box.count();
     std::int64_t halves = 0;
     for (const std::uint32_t word : space.fine) halves += std::popcount(word);
     return space.visible_blocks < blocks || (!space.fine.empty() && halves < 8 * blocks);
@@ -248,12 +248,12 @@ LaneRenderer::LaneRenderer(const Plan& plan, const RenderOptions& options)
 }
 
 void LaneRenderer::find_empty() {
-    const std::int64_t needs = EmptySpace::bytes_for(blocks_met(plan_));
+    const std::int64_t needs = EmptySpace::bytes_for(*plan_.volume, blocks_met(plan_));
     empty_ = empty_space_of(plan_, room_);
     if (empty_) {
         about_ = about(*plan_.volume, empty_);
         if (about_->hides_something) asked_ = empty_.get();
-        room_ -= EmptySpace::bytes_for(empty_->box) + about_->surface.bytes();
+        room_ -= EmptySpace::bytes_for(*plan_.volume, empty_->box) + about_->surface.bytes();
     } else {
         no_room_to_skip_ = may_skip(plan_) && needs > room_;
     }
@@ -342,8 +342,7 @@ std::string words_in_lanes(const Plan& plan) {
 
 std::string LaneRenderer::why() const {
     std::string text = words_and_schedule(plan_, schedule_);
-    if (empty_)
-        text += fmt::format("; {} of {} blocks visible", empty_->visible_blocks, empty_->distance.size());
+    if (empty_) text += fmt::format("; {} of {} blocks visible", empty_->visible_blocks, empty_->box.count());
     if (!no_lit_cells_.empty()) text += fmt::format("; no lit cells: {}", no_lit_cells_);
     if (lit_cells_)
         text += lit_cells_->built()
@@ -355,7 +354,7 @@ std::string LaneRenderer::why() const {
 }
 
 std::int64_t LaneRenderer::bytes() const {
-    return (empty_ ? EmptySpace::bytes_for(empty_->box) + about_->surface.bytes() : 0) +
+    return (empty_ ? EmptySpace::bytes_for(*plan_.volume, empty_->box) + about_->surface.bytes() : 0) +
            (walls_ ? NearWalls::bytes_for(walls_->box) : 0) + (cells_ ? cells_->bytes() : 0) +
            (lit_cells_ ? lit_cells_->bytes() : 0);
 }

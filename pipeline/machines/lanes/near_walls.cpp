@@ -81,21 +81,21 @@ NearWalls find_walls(const Volume& volume, const BlockBox& box, const WallStage&
     NearWalls near{box, {}, {}};
     near.bits.assign(static_cast<std::size_t>(box.count()) * NearWalls::kWords, 0);
     const Index3 &n = box.blocks, &known = ranges->box.blocks;
-    tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
-        for (std::int64_t y = 0; y < n.y; ++y)
-            for (std::int64_t x = 0; x < n.x; ++x) {
-                const Index3 block = box.low + Index3(x, y, z), there = block - ranges->box.low;
-                const auto in_ranges =
-                    static_cast<std::size_t>((there.z * known.y + there.y) * known.x + there.x);
-                if (!walls.between(ranges->smallest[in_ranges], ranges->largest[in_ranges])) continue;
-                std::uint32_t* bits = near.bits.data() + ((z * n.y + y) * n.x + x) * NearWalls::kWords;
-                const Index3 first(block.x * kBlock, block.y * kBlock, block.z * kBlock);
-                if (volume.type == ScalarType::u8)
-                    mark_block<std::uint8_t>(volume, walls, first, bits);
-                else
-                    mark_block<std::uint16_t>(volume, walls, first, bits);
-            }
-    });
+    const auto mark = [&]<class T>(const BlockRanges::Of<T>& of) {
+        tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
+            for (std::int64_t y = 0; y < n.y; ++y)
+                for (std::int64_t x = 0; x < n.x; ++x) {
+                    const Index3 block = box.low + Index3(x, y, z), there = block - ranges->box.low;
+                    const auto in_ranges =
+                        static_cast<std::size_t>((there.z * known.y + there.y) * known.x + there.x);
+                    if (!walls.between(of.smallest[in_ranges], of.largest[in_ranges])) continue;
+                    const Index3 first(block.x * kBlock, block.y * kBlock, block.z * kBlock);
+                    mark_block<T>(volume, walls, first,
+                                  near.bits.data() + ((z * n.y + y) * n.x + x) * NearWalls::kWords);
+                }
+        });
+    };
+    std::visit(mark, ranges->of);
     mark_about(near);
     return near;
 }

@@ -101,7 +101,7 @@ VisibleSurface::VisibleSurface(const EmptySpace& empty)
     tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
         const auto hidden = [&](std::int64_t x, std::int64_t y, std::int64_t layer) -> unsigned {
             const bool beyond = x < 0 || y < 0 || layer < 0 || x == n.x || y == n.y || layer == n.z;
-            return beyond || empty.at(box.low.x + x, box.low.y + y, box.low.z + layer) != 0;
+            return beyond || !empty.visible(box.low.x + x, box.low.y + y, box.low.z + layer);
         };
         for (std::int64_t y = 0; y < n.y; ++y)
             for (std::int64_t x = 0; x < n.x; ++x) {

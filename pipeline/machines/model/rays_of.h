@@ -71,22 +71,27 @@ class ClearSlabs {
         double fastest = 0;  // voxels a slab, along any axis
         for (const Real<double> v : ray.step) fastest = std::max(fastest, std::abs(v.v));
         slabs_per_voxel_ = power_of_two<double>(plan.location.direction_fraction) / fastest;
+        voxels_per_unit_ = power_of_two<double>(-plan.location.location_fraction);
     }
     std::int64_t operator()(std::int64_t k) const {
         if (!empty_) return 0;
-        Index3 block;
+        Index3 block, corner;  // the corner nearest to the place
+        double way = 0;        // to it, in voxels along any axis
         for (int a = 0; a < 3; ++a) {
             const auto axis = static_cast<std::size_t>(a);
             const Real<double> place = locate(plan_.location, ray_, constant<Real<double>>(k), a);
             const std::int64_t cell = to_index(floor_shift(place, plan_.location.location_fraction));
-            block[a] = std::min(cell, plan_.location.last_cell[axis]) >> lanes::kBlockBits;
+            const std::int64_t inside = std::min(cell, plan_.location.last_cell[axis]);
+            block[a] = inside >> lanes::kBlockBits;
+            corner[a] = (inside + lanes::kBlock / 2) >> lanes::kBlockBits;
+            way = std::max(
+                way, std::abs(place.v * voxels_per_unit_ - static_cast<double>(corner[a] * lanes::kBlock)));
         }
-        if (!empty_->box.holds({block, Index3(1)})) return 0;
-        const int distance = empty_->at(block.x, block.y, block.z);
-        if (distance == 0) return 0;
-        // As far as the empty blocks about this one go, less a voxel for roundings.
+        if (!empty_->box.holds({block, Index3(1)}) || empty_->visible(block.x, block.y, block.z)) return 0;
+        // As far as the empty blocks about the corner go, less the way to it and a voxel for roundings.
         constexpr double kMost = 0x1p30;
-        const double voxels = std::max(lanes::kBlock * (distance - 1) - 1, 0);
+        const int clear = empty_->clear_at(corner.x, corner.y, corner.z);
+        const double voxels = std::max(lanes::kBlock * clear - way - 1, 0.0);
         return 1 + static_cast<std::int64_t>(std::min(voxels * slabs_per_voxel_, kMost));
     }
 
@@ -94,7 +99,7 @@ class ClearSlabs {
     const Plan& plan_;
     const lanes::EmptySpace* empty_;
     const RayWords<Real<double>>& ray_;
-    double slabs_per_voxel_;
+    double slabs_per_voxel_, voxels_per_unit_;
 };
 
 template <class W>

@@ -150,7 +150,7 @@ TEST_F(LargeVolume, WithoutAClipBoxItsEmptyPartIsSkippedUnread) {
     std::string hash;
     for (const LayoutRule layout : {LayoutRule::linear, LayoutRule::cells}) {
         RenderOptions options;
-        options.path = Path::lanes, options.layout = layout, options.layout_bytes = 512 << 20;
+        options.path = Path::lanes, options.layout = layout, options.layout_bytes = 340'000'000;
         const Rendering found = render(plan, options);
         EXPECT_LE(found.statistics.bytes, options.layout_bytes);
         EXPECT_LT(found.statistics.visited, found.statistics.samples / 2);
@@ -158,13 +158,13 @@ TEST_F(LargeVolume, WithoutAClipBoxItsEmptyPartIsSkippedUnread) {
         EXPECT_EQ(picture_hash(found.image), hash);
     }
     EXPECT_LE(resident_bytes() - before,
-              std::int64_t{1} << 30);  // 6 bytes for each of 68 million blocks, and copies
+              std::int64_t{1} << 30);  // 4 bytes for each of 68 million blocks, tables of cells and pages
     RenderOptions model;
     model.path = Path::model;
     EXPECT_EQ(picture_hash(render(plan, model).image), hash);
 }
 
-// Tables of 340 MB say which blocks are empty: a limit that has no room for them costs time, and no bit.
+// Tables of 270 MB say which blocks are empty: a limit that has no room for them costs time, and no bit.
 TEST_F(LargeVolume, WithoutRoomForTheTablesOfItsBlocksItIsRenderedWithoutThem) {
     const Scene scene = scene_with(built_in_scene(), view(false, true, "pc"));
     const Plan plan = make_plan(scene, large());
