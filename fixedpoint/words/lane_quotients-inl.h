@@ -157,7 +157,8 @@ HWY_INLINE V whole_quotient(V scaled, V below, V inverse, const Rescale& to) {
         return hn::Add(q, hn::IfThenElseZero(hn::Ge(rest, below), one));
     }
     const auto twice = hn::Add(rest, rest);
-    if (hn::AllTrue(d, hn::Lt(hn::Abs(twice), below))) return q;  // most: ties and estimates off are few
+    // The usual case: in no lane is the remainder as large as half the denominator.
+    if (hn::AllTrue(d, hn::Lt(hn::Abs(twice), below))) return q;
     const auto halved = hn::Mul(q, hn::Set(d, 0.5));
     const auto odd = hn::Ne(halved, hn::Trunc(halved));
     const auto down = hn::Or(hn::Lt(twice, hn::Neg(below)), hn::And(hn::Eq(twice, hn::Neg(below)), odd));

@@ -37,8 +37,8 @@ struct StoredNeighbourhood {
 };
 
 #if HWY_TARGET != HWY_SCALAR
-/// A neighbourhood by its central differences, two a word.  Differences and weights fit 16 bits, for the stage is
-/// DefaultGradient's.
+/// A neighbourhood by its central differences, two a word.
+/// Under DefaultGradient's facts differences and weights fit 16 bits.
 template <class L>
 struct StoredDifferences {
     const lanes::Batch (&difference)[3][4];

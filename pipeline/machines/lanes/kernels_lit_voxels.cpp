@@ -74,8 +74,7 @@ constexpr unsigned rows_of(GradientRule rule) {
 
 using Words = hn::Vec<hn::ScalableTag<Word>>;
 
-/// Gathers four voxels along x at each lane's element of a row, as two words of pairs, or as their middle
-/// pair.
+/// Gathers four voxels along x at each lane's element of a row: as two words of pairs, or the middle pair alone.
 #if HWY_TARGET != HWY_SCALAR
 constexpr bool kGathersRows = true;
 HWY_INLINE Words spread_bytes(Words two) {
