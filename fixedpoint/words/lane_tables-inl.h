@@ -235,8 +235,9 @@ HWY_INLINE Lanes<std::int32_t, K> blend_pairs(hn::Vec<hn::ScalableTag<std::int32
                                               hn::Vec<hn::ScalableTag<std::int32_t>> weights,
                                               std::int32_t offset, const Rescale& to) {
     const hn::ScalableTag<std::int32_t> d;
-#if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR
-    // On x86, Highway's operation is one instruction for both products and their sum.
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_SSE4
+    // There Highway's operation is one instruction for both products and their sum; elsewhere `unused` takes
+    // one of the products.
     const hn::ScalableTag<std::int16_t> d16;
     auto unused = hn::Zero(d);
     const auto sum = [&](std::int32_t start) {
