@@ -84,7 +84,7 @@ CellValues CostBlocks::lit_cell(const Place& at) const {
     } else if (marks_) {
         Place block{};
         for (std::size_t a = 0; a < 3; ++a) block[a] = (at[a] - met(a).first) >> kMarkBits;
-        may_count = marks_->block[marks_->index(block[0], block[1], block[2])] != 0;
+        may_count = marks_->at(block[0], block[1], block[2]) != 0;
     }
     if (may_count) lights_->add_to(cell, at);
     return cell;
@@ -140,8 +140,9 @@ void CostBlocks::mark_lit() {
         if (2 * within_a_step_[a] > std::int64_t{1} << kMarkBits) return;
         blocks[a] = ((spans[a].size() - 1) >> kMarkBits) + 1;
     }
-    Grid<char> marks{blocks, std::vector<char>(static_cast<std::size_t>(blocks[0] * blocks[1] * blocks[2]))};
-    Grid<char> cost = marks;
+    BlockGrid<char> marks{blocks,
+                          std::vector<char>(static_cast<std::size_t>(blocks[0] * blocks[1] * blocks[2]))};
+    BlockGrid<char> cost = marks;
     tbb::parallel_for(std::int64_t{0}, blocks[2], [&](std::int64_t bz) {
         const std::int64_t z0 = spans[2].first + (bz << kMarkBits);
         for (std::int64_t z = z0; z <= std::min(z0 + (1 << kMarkBits) - 1, spans[2].last); ++z)

@@ -16,6 +16,18 @@ struct CellBox {
     std::array<std::int64_t, 3> first{}, last{};
 };
 
+/// Something of each block of cells, x fastest.
+template <class T>
+struct BlockGrid {
+    std::array<std::int64_t, 3> blocks{};
+    std::vector<T> block{};
+    std::size_t index(std::int64_t x, std::int64_t y, std::int64_t z) const {
+        return static_cast<std::size_t>((z * blocks[1] + y) * blocks[0] + x);
+    }
+    T& at(std::int64_t x, std::int64_t y, std::int64_t z) { return block[index(x, y, z)]; }
+    const T& at(std::int64_t x, std::int64_t y, std::int64_t z) const { return block[index(x, y, z)]; }
+};
+
 class CostBlocks {
   public:
     /// Of the cells that the plan renders.  Uses the calling task arena.
@@ -40,16 +52,7 @@ class CostBlocks {
     bool at_a_face(std::int64_t x, std::int64_t y, std::int64_t z) const;
 
   private:
-    template <class T>
-    struct Grid {
-        std::array<std::int64_t, 3> blocks{};
-        std::vector<T> block{};
-        std::size_t index(std::int64_t x, std::int64_t y, std::int64_t z) const {
-            return static_cast<std::size_t>((z * blocks[1] + y) * blocks[0] + x);
-        }
-        T& at(std::int64_t x, std::int64_t y, std::int64_t z) { return block[index(x, y, z)]; }
-    };
-    using Level = Grid<Found>;
+    using Level = BlockGrid<Found>;
     using Place = std::array<std::int64_t, 3>;
     CellValues of_cell(const Place& at) const;
     /// With light, where anything near can cost anything.
@@ -73,9 +76,9 @@ class CostBlocks {
     std::array<std::array<double, 2>, 3> inside_{};  // farther from the faces than a ray's last slab reaches
     CellValues whole_;
     std::optional<CellLights> lights_;
-    static constexpr int kMarkBits = 3;  // cells along a side of a marked block, as a power of two
-    std::optional<Grid<char>> marks_;    // of slabs with two ends; none: all
-    int lowest_bits_ = 0;                // cells along a side of a block, as a power of two
+    static constexpr int kMarkBits = 3;     // cells along a side of a marked block, as a power of two
+    std::optional<BlockGrid<char>> marks_;  // of slabs with two ends; none: all
+    int lowest_bits_ = 0;                   // cells along a side of a block, as a power of two
     std::vector<Level> levels_;
 };
 

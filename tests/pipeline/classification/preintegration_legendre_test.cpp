@@ -63,8 +63,8 @@ TEST(LegendreSeries, ReproducesTheStudysErrorsOfK) {
     // piecewise step smeared over one entry of 1024, which moves K by less than x / 1024.
     for (const auto& [x, two, four] :
          {std::tuple{1.0, 0.0005, 0.0}, {2.0, 0.004, 0.0}, {3.0, 0.011, 0.0}, {6.0, 0.051, -0.003}}) {
-        const Entries entries = cases::entries_of(1025, [&](int i) {
-            return cases::Matter{x, grey(i < 512 ? 1 : i == 512 ? 0.5 : 0)};
+        const Entries entries = cases::entries_of(1025, [depth = x](int i) {
+            return cases::Matter{depth, grey(i < 512 ? 1 : i == 512 ? 0.5 : 0)};
         });
         const double truth = exact_slab(entries, 0, 1024, 1).color.x / -std::expm1(-x);
         for (const auto& [order, error] : {std::pair{2, two}, {4, four}}) {
@@ -224,9 +224,9 @@ TEST(OverlappedTables, LoseWhatTheirWordsLose) {
     double worst_coarse = 0, worst_fine = 0;
     for (const auto& [front, back, length] : cases::slabs(200, 400, true, 42)) {
         if (front == back) continue;
-        const auto error = [&](const OverlappedTables& tables) {
-            const Vec3 a = legendre_color(tables.moments(front, back, 1, 2), 2),
-                       b = legendre_color(exact.moments(front, back, 1, 2), 2);
+        const auto error = [&exact, from = front, to = back](const OverlappedTables& tables) {
+            const Vec3 a = legendre_color(tables.moments(from, to, 1, 2), 2),
+                       b = legendre_color(exact.moments(from, to, 1, 2), 2);
             return std::abs(a.x - b.x) * 255;
         };
         worst_coarse = std::max(worst_coarse, error(coarse));
