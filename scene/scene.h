@@ -148,6 +148,16 @@ struct ShadingSettings {
     double cool_share = 0.2, warm_share = 0.6;  // and the matter's shares in them
 };
 
+/// The orders of a series: n of pips and leg.  Every other method has one.
+struct Orders {
+    int least = 1, most = 1;
+};
+constexpr Orders orders_of(Method method) {
+    if (method == Method::pips) return {1, 5};
+    if (method == Method::leg) return {2, 4};
+    return {};
+}
+
 struct ClassificationSettings {
     Method method = Method::pc;
     std::optional<int> order;  // n of pips and leg
@@ -158,7 +168,7 @@ struct ClassificationSettings {
     bool as_printed = false;                       // for experiments only: pips with the errors of the paper
 
     /// The order; where none is given, the least that the method has.
-    int order_or_least() const { return order.value_or(method == Method::leg ? 2 : 1); }
+    int order_or_least() const { return order.value_or(orders_of(method).least); }
 };
 
 struct CompositingSettings {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <set>
 
 namespace squint {
@@ -99,11 +100,15 @@ SlabCheck check_slabs(const Plan& plan, bool against_exact) {
 
 std::vector<NamedMethod> every_method() {
     std::vector<NamedMethod> methods;
-    for (const Method method :
-         {Method::pc, Method::pi1d, Method::pi1d_engel, Method::pi2d_no_attenuation, Method::pi2d})
-        methods.push_back({std::string(name_of(method)), method, 1});
-    for (int n = 1; n <= 5; ++n) methods.push_back({"pips " + std::to_string(n), Method::pips, n});
-    for (int n = 2; n <= 4; ++n) methods.push_back({"leg " + std::to_string(n), Method::leg, n});
+    for (std::size_t i = 0; i < std::size(EnumNames<Method>::names); ++i) {
+        const auto method = static_cast<Method>(i);
+        if (method == Method::pc_mid) continue;  // a slab of pc, sampled elsewhere
+        const Orders orders = orders_of(method);
+        for (int n = orders.least; n <= orders.most; ++n)
+            methods.push_back({orders.most == 1 ? std::string(name_of(method))
+                                                : std::string(name_of(method)) + ' ' + std::to_string(n),
+                               method, n});
+    }
     return methods;
 }
 

@@ -29,8 +29,7 @@ std::vector<HardSlab> hard_slabs(const Plan& plan);
 /// Classifies hard_slabs() in the model's widest word.  Without `exact` it checks only the range.
 SlabCheck check_slabs(const Plan& plan, bool against_exact = true);
 
-/// Every method that a scene can name, as settings: pc, pi1d, pi1d_engel, pi2d, pi2d_no_attenuation, pips 1
-/// to 5, leg 2 to 4.
+/// Every method that a scene can name and each of its orders, but pc_mid, whose slabs are those of pc.
 struct NamedMethod {
     std::string name;  // "pips 3"
     Method method;

@@ -1,5 +1,5 @@
 // The one list of classification methods.  To add a method: its files beside this one, a line here and in
-// methods-inl.h, a name in scene.h (docs/architecture.md).
+// methods-inl.h, its name and orders in scene.h (docs/architecture.md).
 //
 // A method is a type M with
 //   static constexpr bool kPremultiplied     whether its slab colour already carries the opacity

@@ -235,11 +235,14 @@ void fill_weights(MomentSeries& m, bool legendre, double deepest) {
     m.to_weight = Rescale(m.weight_fraction + m.depth_fraction - m.row_bits, spec);
 }
 
-void check_order(const ClassificationSettings& settings, int first, int last) {
+static_assert(orders_of(Method::leg).most == preintegration::kMostLegendre &&
+              orders_of(Method::pips).most == preintegration::kMostMoments);
+void check_order(const ClassificationSettings& settings) {
     const int order = settings.order_or_least();
-    if (order < first || order > last)
+    const Orders orders = orders_of(settings.method);
+    if (order < orders.least || order > orders.most)
         throw InputError(fmt::format("classification.order: {} is not an order of {}, which has {} to {}",
-                                     order, name_of(settings.method), first, last));
+                                     order, name_of(settings.method), orders.least, orders.most));
 }
 
 }  // namespace
@@ -256,7 +259,7 @@ void MomentSeries::describe(ClassificationReport& report) const {
 
 MomentSeries MomentSeries::build(const ClassificationInputs& in) {
     const bool legendre = in.settings.method == Method::leg;
-    check_order(in.settings, 2, legendre ? preintegration::kMostLegendre : preintegration::kMostMoments);
+    check_order(in.settings);
     MomentSeries m;
     m.prefix = build_prefix_lookup(in);
     m.order = in.settings.order_or_least();
