@@ -21,9 +21,9 @@ int input_fraction(const Plan& plan) {
 std::vector<int> knots_of(const Entries& entries) {
     std::vector<std::pair<double, int>> bends;
     for (int i = 1; i + 1 < entries.size(); ++i) {
-        const Entry &before = entries.entry[static_cast<std::size_t>(i - 1)],
+        const Entry &before = entries.entry[static_cast<std::size_t>(i) - 1],
                     &here = entries.entry[static_cast<std::size_t>(i)],
-                    &after = entries.entry[static_cast<std::size_t>(i + 1)];
+                    &after = entries.entry[static_cast<std::size_t>(i) + 1];
         const Vec3 color = before.color + after.color - here.color * 2;
         double bend =
             std::abs(before.extinction + after.extinction - 2 * here.extinction) * entries.unit_distance +
