@@ -40,7 +40,7 @@ constexpr Limits kLimits[] = {
     {"shading.warm", 0, 1},
     {"shading.cool_share", 0, 1},
     {"shading.warm_share", 0, 1},
-    {"classification.order", 1, 5},
+    {"classification.order", 1, orders_of(Method::pips).most},
     {"classification.table_size", 64, 4096},
     {"precision.budget", 0, kNone, true},
     {"lights.color", 0, 1},

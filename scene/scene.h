@@ -148,7 +148,7 @@ struct ShadingSettings {
     double cool_share = 0.2, warm_share = 0.6;  // and the matter's shares in them
 };
 
-/// The orders of a series: n of pips and leg.  Every other method has one.
+/// The orders that a method has: n of pips and leg, of every other method 1 alone.
 struct Orders {
     int least = 1, most = 1;
 };

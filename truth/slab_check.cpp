@@ -104,10 +104,11 @@ std::vector<NamedMethod> every_method() {
         const auto method = static_cast<Method>(i);
         if (method == Method::pc_mid) continue;  // a slab of pc, sampled elsewhere
         const Orders orders = orders_of(method);
-        for (int n = orders.least; n <= orders.most; ++n)
-            methods.push_back({orders.most == 1 ? std::string(name_of(method))
-                                                : std::string(name_of(method)) + ' ' + std::to_string(n),
-                               method, n});
+        for (int n = orders.least; n <= orders.most; ++n) {
+            std::string name(name_of(method));
+            if (orders.most > 1) name += ' ' + std::to_string(n);
+            methods.push_back({name, method, n});
+        }
     }
     return methods;
 }
