@@ -3,11 +3,11 @@
 #include "core/procedural.h"
 
 #include "core/error.h"
+#include "core/parallel.h"
 #include "core/portable_math.h"
 #include "core/volume_data.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
@@ -438,7 +438,7 @@ double unit_coordinate(std::int64_t index, std::int64_t size) {
 
 template <class Scalar>
 void sample(const ProceduralField& field, const Index3& dims, double levels, Scalar* voxels) {
-    tbb::parallel_for(std::int64_t{0}, dims.z, [&](std::int64_t z) {
+    in_parallel(dims.z, [&](std::int64_t z) {
         Scalar* at = voxels + z * dims.y * dims.x;
         Vec3 p{0, 0, unit_coordinate(z, dims.z)};
         for (std::int64_t y = 0; y < dims.y; ++y) {

@@ -3,12 +3,12 @@
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/parallel.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
-#include <tbb/parallel_for.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -158,7 +158,7 @@ void measure(Volume& volume) {
         nothing = measured(reinterpret_cast<const unsigned char*>(zeros.data()), kPieceBytes);
     }
     std::vector<Piece> pieces((bytes + kPieceBytes - 1) / kPieceBytes);
-    tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t i) {
+    in_parallel(pieces.size(), [&](std::size_t i) {
         const std::size_t from = i * kPieceBytes, size = std::min(kPieceBytes, bytes - from);
         const auto first = static_cast<std::int64_t>(from / volume.scalar_bytes()),
                    end = static_cast<std::int64_t>((from + size) / volume.scalar_bytes());

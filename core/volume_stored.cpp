@@ -2,11 +2,9 @@
 #include "core/volume_stored.h"
 
 #include "core/error.h"
+#include "core/parallel.h"
 
 #include <fmt/format.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <atomic>
@@ -108,23 +106,19 @@ struct FileOrder {
     }
 };
 
-/// Folds the numbers of the chosen component, in parallel: fold(so far, number) over all, then join(a,
-/// b).
+constexpr std::int64_t kRowsPerPiece = 64;
+
+/// Folds the numbers of the chosen component, in parallel: fold(so far, number) over all, then join(a, b).
 template <class T, class Part, class Fold, class Join>
 Part reduce_voxels(const StoredVolume& stored, const Part& none, const Fold& fold, const Join& join) {
     const Reader<T> read = reader<T>(stored);
     const FileOrder file(stored);
-    return tbb::parallel_reduce(
-        tbb::blocked_range<std::int64_t>(0, file.dims.y * file.dims.z, 64), none,
-        [&](const auto& rows, Part part) {
-            for (std::int64_t row = rows.begin(); row < rows.end(); ++row) {
-                const std::int64_t y = row % file.dims.y, z = row / file.dims.y;
-                std::int64_t index = file.first + y * file.step.y + z * file.step.z;
-                for (std::int64_t x = 0; x < file.dims.x; ++x, index += file.step.x) fold(part, read(index));
-            }
-            return part;
-        },
-        join);
+    const auto fold_row = [&](Part& part, std::int64_t row) {
+        const std::int64_t y = row % file.dims.y, z = row / file.dims.y;
+        std::int64_t index = file.first + y * file.step.y + z * file.step.z;
+        for (std::int64_t x = 0; x < file.dims.x; ++x, index += file.step.x) fold(part, read(index));
+    };
+    return reduce_in_parallel(file.dims.y * file.dims.z, kRowsPerPiece, none, fold_row, join);
 }
 
 /// Sets levels[world order] = convert(voxel, its index in the file), rows in parallel.
@@ -132,8 +126,8 @@ template <class T, class Scalar, class Convert>
 void convert_voxels(const StoredVolume& stored, void* levels, const Convert& convert) {
     const Reader<T> read = reader<T>(stored);
     const FileOrder file(stored);
-    tbb::parallel_for(tbb::blocked_range<std::int64_t>(0, file.dims.y * file.dims.z), [&](const auto& rows) {
-        for (std::int64_t row = rows.begin(); row < rows.end(); ++row) {
+    in_parallel_pieces(file.dims.y * file.dims.z, kRowsPerPiece, [&](std::int64_t begin, std::int64_t end) {
+        for (std::int64_t row = begin; row < end; ++row) {
             const std::int64_t y = row % file.dims.y, z = row / file.dims.y;
             const std::int64_t start = file.first + y * file.step.y + z * file.step.z;
             Scalar* out = static_cast<Scalar*>(levels) + row * file.dims.x;
@@ -443,16 +437,13 @@ struct Rest {
 
 Rest rest_of(const Volume& volume) {
     const auto* scalars = static_cast<const std::uint16_t*>(volume.data.get());
-    return tbb::parallel_reduce(
-        tbb::blocked_range<std::int64_t>(0, volume.voxels(), 1 << 18), Rest{},
-        [&](const auto& range, Rest rest) {
-            for (std::int64_t i = range.begin(); i < range.end(); ++i) {
-                const std::uint32_t s = scalars[i];
-                rest.at_smallest += s == volume.smallest, rest.at_largest += s == volume.largest;
-                if (s != volume.smallest) rest.smallest = std::min(rest.smallest, s);
-                if (s != volume.largest) rest.largest = std::max(rest.largest, s);
-            }
-            return rest;
+    return reduce_in_parallel(
+        volume.voxels(), std::int64_t{1} << 18, Rest{},
+        [&](Rest& rest, std::int64_t i) {
+            const std::uint32_t s = scalars[i];
+            rest.at_smallest += s == volume.smallest, rest.at_largest += s == volume.largest;
+            if (s != volume.smallest) rest.smallest = std::min(rest.smallest, s);
+            if (s != volume.largest) rest.largest = std::max(rest.largest, s);
         },
         [](const Rest& a, const Rest& b) {
             return Rest{std::min(a.smallest, b.smallest), std::max(a.largest, b.largest),

@@ -1,9 +1,8 @@
 // A cache of what is computed once for a volume, kept while its voxels live.
 #pragma once
 
+#include "core/parallel.h"
 #include "core/volume.h"
-
-#include <tbb/task_arena.h>
 
 #include <map>
 #include <memory>
@@ -22,9 +21,8 @@ class KeptPerVolume {
         if (const auto found = kept_.find(volume.data.get());
             found != kept_.end() && found->second.dims == volume.dims && good(*found->second.thing))
             return found->second.thing;
-        // `make` may run in parallel: a thread that waits in it must not take up work that needs this
-        // lock.
-        const std::shared_ptr<T> thing = tbb::this_task_arena::isolate(make);
+        std::shared_ptr<T> thing;
+        isolated([&] { thing = make(); });
         kept_[volume.data.get()] = {volume.data, volume.dims, thing};
         return thing;
     }

@@ -1,16 +1,12 @@
 #include "pipeline/render.h"
 
 #include "core/error.h"
-#include "core/threads.h"
+#include "core/parallel.h"
 #include "pipeline/machines/lanes/blocks_met.h"
 #include "pipeline/machines/lanes/lane_renderer.h"
 #include "pipeline/machines/model.h"
 
 #include <fmt/format.h>
-
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <chrono>
@@ -123,26 +119,20 @@ void render(const Plan& plan, const RenderOptions& options, Rendering& into) {
         std::chrono::duration<double>(std::chrono::steady_clock::now() - setup_start).count();
 
     const auto start = std::chrono::steady_clock::now();
-    tbb::task_arena arena(statistics.threads);
-    arena.execute([&] {
-        tbb::parallel_for(
-            tbb::blocked_range<std::size_t>(0, tiles.size(), 1),
-            [&](const tbb::blocked_range<std::size_t>& range) {
-                for (std::size_t i = range.begin(); i != range.end(); ++i) {
-                    if (options.cancelled && *options.cancelled) stopped = true;
-                    if (stopped) return;
-                    const Tile& t = tiles[i];
-                    if (is_used) clear(t, image);
-                    if (fast)
-                        fast->render_tile(t.left, t.top, t.right, t.bottom, image, per_tile[i]);
-                    else
-                        model.render_tile(t.left, t.top, t.right, t.bottom, image, per_tile[i]);
-                    const std::size_t now = ++done;
-                    if (options.progress)
-                        options.progress(static_cast<double>(now) / static_cast<double>(tiles.size()));
-                }
-            },
-            tbb::simple_partitioner());
+    on_threads(statistics.threads, [&] {
+        in_parallel(tiles.size(), [&](std::size_t i) {
+            if (options.cancelled && *options.cancelled) stopped = true;
+            if (stopped) return;
+            const Tile& t = tiles[i];
+            if (is_used) clear(t, image);
+            if (fast)
+                fast->render_tile(t.left, t.top, t.right, t.bottom, image, per_tile[i]);
+            else
+                model.render_tile(t.left, t.top, t.right, t.bottom, image, per_tile[i]);
+            const std::size_t now = ++done;
+            if (options.progress)
+                options.progress(static_cast<double>(now) / static_cast<double>(tiles.size()));
+        });
     });
     if (stopped) throw Cancelled{};
     statistics.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -162,9 +152,8 @@ Image render_thinned(const Plan& plan, const RenderOptions& options, int every) 
     if (options.skip) model.skip_empty_space(lanes::room_of(options));
     std::atomic<bool> stopped{false};
     const int rows = thinned_size(image.height, every);
-    tbb::task_arena arena(threads_for(options.threads));
-    arena.execute([&] {
-        tbb::parallel_for(0, rows, [&](int i) {
+    on_threads(options.threads, [&] {
+        in_parallel(rows, [&](int i) {
             if (options.cancelled && *options.cancelled) stopped = true;
             const int row = i * every + every / 2;
             for (int column = every / 2; column < image.width && !stopped; column += every) {

@@ -1,6 +1,6 @@
 # Includes run one way: fixedpoint, core <- scene <- pipeline <- truth <- studies <- cli, python, bench.  Inside pipeline
 # the stages, the methods and the plan know no machine.  Highway stays in -inl.h files, in machines and in files
-# compiled once per target; a header with data includes neither.
+# compiled once per target; a header with data includes neither.  Parallel loops are core/parallel.h's.
 #   cmake -DSOURCE=<tree> -P tests/dependencies.cmake
 cmake_minimum_required(VERSION 3.20)
 
@@ -51,6 +51,9 @@ foreach(room fixedpoint core scene pipeline truth studies cli python bench)
       elseif(line MATCHES "<hwy/" AND NOT is_inl AND NOT is_machine AND NOT text MATCHES "hwy/foreach_target" AND
              NOT file STREQUAL "cli/doctor.cpp")  # it names the library's version
         complain(${file} "includes Highway: -inl.h files, machines and files compiled per target do")
+      elseif(line MATCHES "<(oneapi/)?tbb/" AND NOT line MATCHES "enumerable_thread_specific|version\\.h" AND
+             NOT file STREQUAL "core/parallel.cpp")
+        complain(${file} "includes oneTBB: loops in parallel are core/parallel.h's")
       endif()
     endforeach()
   endforeach()

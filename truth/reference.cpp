@@ -1,15 +1,11 @@
 #include "truth/reference.h"
 
+#include "core/parallel.h"
 #include "core/portable_math.h"
-#include "core/threads.h"
 #include "pipeline/render.h"
 #include "truth/reference_field.h"
 #include "truth/reference_light.h"
 #include "truth/reference_matter.h"
-
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -455,9 +451,8 @@ Image render_reference(const Plan& plan, const ReferenceOptions& options) {
                     image.channels[c].values[at] = static_cast<float>(pixel[c]);
             }
     };
-    tbb::task_arena arena(threads_for(options.threads));
-    arena.execute([&] {
-        tbb::parallel_for(0, tiles, [&](int tile) {
+    on_threads(options.threads, [&] {
+        in_parallel(tiles, [&](int tile) {
             if (options.cancelled && *options.cancelled) stopped = true;
             if (stopped) return;
             render_tile(tile);

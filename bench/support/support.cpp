@@ -3,13 +3,12 @@
 #include "core/compare.h"
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/parallel.h"
 #include "core/volume_source.h"
 #include "pipeline/record.h"
 #include "truth/reference.h"
 
 #include <fmt/format.h>
-
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -40,7 +39,7 @@ Image empty_picture(int width, int height) {
 /// Calls visit(column, row) for every pixel of the lattice, on many threads.
 template <class V>
 void visit_lattice(int width, int height, int every, V&& visit) {
-    tbb::parallel_for(0, (height - every / 2 + every - 1) / every, [&](int i) {
+    in_parallel((height - every / 2 + every - 1) / every, [&](int i) {
         for (int column = every / 2; column < width; column += every) visit(column, i * every + every / 2);
     });
 }

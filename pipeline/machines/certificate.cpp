@@ -1,7 +1,7 @@
 #include "pipeline/machines/certificate.h"
 
 #include "core/error.h"
-#include "core/threads.h"
+#include "core/parallel.h"
 #include "pipeline/machines/certificate/methods.h"
 #include "pipeline/machines/certificate/premultiplied.h"
 #include "pipeline/machines/certificate/ray.h"
@@ -12,10 +12,6 @@
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -180,10 +176,9 @@ Certificate certify(const Plan& plan, const CertificateOptions& options) {
     const int every = std::max(options.every, 1), wanted = (plan.camera.height + every - 1) / every;
     std::atomic<bool> stopped{false};
     std::atomic<int> done{0};
-    tbb::task_arena arena(threads_for(options.threads));
     const auto certify_all = [&](const auto& method) {
-        arena.execute([&] {
-            tbb::parallel_for(0, plan.camera.height, [&](int row) {
+        on_threads(options.threads, [&] {
+            in_parallel(plan.camera.height, [&](int row) {
                 if (options.cancelled && *options.cancelled) stopped = true;
                 if (stopped || row % every != 0) return;
                 certify_row(plan, method, row, options, image, rows[static_cast<std::size_t>(row)]);

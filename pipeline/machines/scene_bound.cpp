@@ -1,8 +1,8 @@
 #include "pipeline/machines/scene_bound.h"
 
 #include "core/error.h"
+#include "core/parallel.h"
 #include "core/portable_math.h"
-#include "core/threads.h"
 #include "pipeline/machines/certificate/payers.h"
 #include "pipeline/machines/scene_bound/beams.h"
 #include "pipeline/plan/ranges.h"
@@ -10,9 +10,6 @@
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -129,8 +126,7 @@ class Search {
     double top() const { return waiting_.empty() ? 0 : waiting_.top().behind.sum(); }
     void add(const std::vector<Beam>& beams) {
         std::vector<std::optional<Behind>> bounds(beams.size());
-        tbb::parallel_for(std::size_t{0}, beams.size(),
-                          [&](std::size_t i) { bounds[i] = beams_.bound(beams[i]); });
+        in_parallel(beams.size(), [&](std::size_t i) { bounds[i] = beams_.bound(beams[i]); });
         for (std::size_t i = 0; i < beams.size(); ++i)
             if (bounds[i]) waiting_.push({*bounds[i], serial_++, beams[i]});
         used_ += static_cast<std::int64_t>(beams.size());
@@ -305,8 +301,7 @@ SceneBound bound_scene(const Plan& plan, const SceneBoundOptions& options) {
 
     SceneBound b;
     b.samples = static_cast<std::int64_t>(most_steps(plan)) + 1;
-    tbb::task_arena arena(threads_for(options.threads));
-    arena.execute([&] {
+    on_threads(options.threads, [&] {
         const CostBlocks blocks(plan, errors, light, costs);
         const Beams beams(plan, errors, blocks, compositing);
         const auto in_lsb8 = [&](const Behind& behind) {

@@ -1,11 +1,9 @@
 #include "studies/reproduce/angles.h"
 
+#include "core/parallel.h"
 #include "pipeline/render.h"
 #include "pipeline/slab-inl.h"
 #include "pipeline/stages/ray_setup-inl.h"
-
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <cmath>
 
@@ -54,9 +52,8 @@ Image gradient_turns(const Plan& plan, int threads, const std::atomic<bool>* can
     Image image{plan.camera.width, plan.camera.height, {}};
     for (const char* name : {"slabs", "angle60", "angle90"}) image.add_float(name);
     std::atomic<bool> stopped{false};
-    tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
-    arena.execute([&] {
-        tbb::parallel_for(0, image.height, [&](int row) {
+    on_threads(threads, [&] {
+        in_parallel(image.height, [&](int row) {
             if (cancelled && *cancelled) stopped = true;
             if (stopped) return;
             for (int column = 0; column < image.width; ++column) {

@@ -2,7 +2,7 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
-#include "core/threads.h"
+#include "core/parallel.h"
 #include "pipeline/record.h"
 #include "pipeline/render.h"
 #include "scene/toml.h"

@@ -1,7 +1,7 @@
 // Runs pieces of work in parallel, each on one thread.
 #pragma once
 
-#include <tbb/task_arena.h>
+#include "core/parallel.h"
 
 #include <algorithm>
 #include <atomic>
@@ -22,8 +22,7 @@ void side_by_side(std::size_t count, int threads, F&& f) {
     std::exception_ptr first;
     std::mutex mutex;
     const auto work = [&] {
-        tbb::task_arena alone(1);  // parallel work inside a piece stays on its thread
-        alone.execute([&] {
+        on_threads(1, [&] {  // parallel loops inside a piece stay on its thread
             for (std::size_t i; !stop && (i = next++) < count;) try {
                     f(i);
                 } catch (...) {

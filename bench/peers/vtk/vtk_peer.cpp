@@ -1,10 +1,9 @@
 #include "bench/peers/vtk/vtk_peer.h"
 
 #include "core/error.h"
+#include "core/parallel.h"
 
 #include <fmt/format.h>
-
-#include <tbb/parallel_for.h>
 
 #include <vtkCamera.h>
 #include <vtkColorTransferFunction.h>
@@ -290,7 +289,7 @@ Image VtkPeer::in_double(int every) const {
     Image image;
     image.width = p.camera.width, image.height = p.camera.height;
     for (const char* name : {"R", "G", "B", "A"}) image.add_float(name);
-    tbb::parallel_for(0, (image.height - every / 2 + every - 1) / every, [&](int i) {
+    in_parallel((image.height - every / 2 + every - 1) / every, [&](int i) {
         const int row = i * every + every / 2, y = image.height - 1 - row - origin[1];
         if (y < 0 || y >= size[1]) return;
         for (int column = every / 2; column < image.width; column += every) {

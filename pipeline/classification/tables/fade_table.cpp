@@ -1,9 +1,7 @@
 #include "pipeline/classification/tables/fade_table.h"
 
+#include "core/parallel.h"
 #include "core/portable_math.h"
-
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -177,9 +175,8 @@ std::vector<std::vector<double>> build_fades(const Entries& entries, int size, d
         const double s = static_cast<double>(std::int64_t{j} * (entries.size() - 1)) / (size - 1);
         put(j, j, fade_moments(entries, s, s, length));
     }
-    tbb::parallel_for(tbb::blocked_range<int>(1, size), [&](const tbb::blocked_range<int>& range) {
-        for (int m = range.begin(); m < range.end(); ++m)
-            for (const bool down : {false, true}) Diagonal(entries, size, length, m, down).solve(put);
+    in_parallel(size - 1, [&](int i) {
+        for (const bool down : {false, true}) Diagonal(entries, size, length, i + 1, down).solve(put);
     });
     return tables;
 }

@@ -1,13 +1,12 @@
 #include "pipeline/classification/tables/pi2d_table.h"
 
-#include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/enumerable_thread_specific.h>
-#include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 
+#include "core/parallel.h"
 #include "core/portable_math.h"
 #include "pipeline/classification/tables/exact_slab.h"
 #include "pipeline/classification/tables/pi1d_table.h"
@@ -289,7 +288,7 @@ RealPreIntegrated2D empty_table(const Entries& entries, int size, double length)
 /// Fills every node with `slab(front, back)`.
 template <class SlabOf>
 void fill(RealPreIntegrated2D& table, const SlabOf& slab) {
-    oneapi::tbb::parallel_for(0, table.size, [&](int f) {
+    in_parallel(table.size, [&](int f) {
         for (int b = 0; b < table.size; ++b) {
             const SlabValue value = slab(node_coordinate(f, table.size, table.entries),
                                          node_coordinate(b, table.size, table.entries));
@@ -307,13 +306,11 @@ void for_each_diagonal_group(const Entries& entries, int size, double length, co
     const Grid grid = make_grid(entries, size, length);
     oneapi::tbb::enumerable_thread_specific<Worker> workers;
     const int groups = (size + kDiagonalsPerGroup - 1) / kDiagonalsPerGroup;
-    oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<int>(0, groups, 4), [&](const auto& range) {
+    in_parallel(groups, [&](int g) {
         Worker& worker = workers.local();
         if (!worker.solver) worker.solver = std::make_unique<DiagonalSolver>(grid);
-        for (int g = range.begin(); g < range.end(); ++g) {
-            const int first = g * kDiagonalsPerGroup;
-            group(first, std::min(kDiagonalsPerGroup, size - first), *worker.solver, worker.scratch);
-        }
+        const int first = g * kDiagonalsPerGroup;
+        group(first, std::min(kDiagonalsPerGroup, size - first), *worker.solver, worker.scratch);
     });
 }
 

@@ -1,13 +1,11 @@
 #include "pipeline/machines/lanes/cell_blocks.h"
 
+#include "core/parallel.h"
 #include "pipeline/kept.h"
 #include "pipeline/stages/faces.h"
 #include "pipeline/stages/gradient-inl.h"
 
 #include <sys/mman.h>
-
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cstring>
@@ -132,8 +130,7 @@ void CellBlocks::build(const std::function<bool(std::int64_t)>& wanted) {
             fill<std::uint16_t>(fresh[i], cells);
         slots_[static_cast<std::size_t>(fresh[i])] = static_cast<std::int32_t>(place * kCells);
     };
-    // A thread that waits here must not take up work that needs this lock.
-    tbb::this_task_arena::isolate([&] { tbb::parallel_for(std::size_t{0}, fresh.size(), fill_block); });
+    isolated([&] { in_parallel(fresh.size(), fill_block); });
     taken_ += static_cast<std::int64_t>(fresh.size());
     if (!near_ || !fresh.empty()) find_near();
 }

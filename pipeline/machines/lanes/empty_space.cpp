@@ -1,9 +1,7 @@
 #include "pipeline/machines/lanes/empty_space.h"
 
+#include "core/parallel.h"
 #include "pipeline/kept.h"
-
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <atomic>
@@ -96,7 +94,7 @@ void find_clear(EmptySpace& space) {
     space.corners = n;
     space.clear.reserve(count + 3);  // lanes read four bytes at any of them
     space.clear.resize(count);
-    tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
+    in_parallel(n.z, [&](std::int64_t z) {
         // Of the blocks about a row of corners, one more on either side; so far their bits are 0 or 1.
         std::vector<std::uint8_t> about(nx + 2);
         std::uint8_t* const seen = about.data();
@@ -145,7 +143,7 @@ void find_spans(EmptySpace& space) {
     };
     // A slice reads the next, which none may write meanwhile.
     for (const std::int64_t odd : {std::int64_t{0}, std::int64_t{1}})
-        tbb::parallel_for(odd, n.z, std::int64_t{2}, slice);
+        in_parallel((n.z - odd + 1) / 2, [&](std::int64_t pair) { slice(2 * pair + odd); });
 }
 
 template <class T>
@@ -153,7 +151,7 @@ BlockRanges::Of<T> measure_all(const Volume& volume, const BlockBox& box) {
     const auto count = static_cast<std::size_t>(box.count());
     BlockRanges::Of<T> ranges;
     ranges.smallest.assign(count, std::numeric_limits<T>::max()), ranges.largest.assign(count, 0);
-    tbb::parallel_for(std::int64_t{0}, box.blocks.z, [&](std::int64_t z) {
+    in_parallel(box.blocks.z, [&](std::int64_t z) {
         for (std::int64_t y = 0; y < box.blocks.y; ++y) measure_row<T>(volume, box, ranges, y, z);
     });
     return ranges;
@@ -228,7 +226,7 @@ void find_visible(const BlockRanges::Of<T>& ranges, const SeenRanges& can_be_see
     space.spans.reserve(count + 3);  // lanes read four bytes at any of them
     space.spans.resize(count);
     std::atomic<std::int64_t> visible{0};
-    tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
+    in_parallel(n.z, [&](std::int64_t z) {
         const std::int64_t blocks = n.x * n.y;
         const T* smallest = ranges.smallest.data() + z * blocks;
         const T* largest = ranges.largest.data() + z * blocks;
@@ -288,7 +286,7 @@ std::vector<std::uint8_t> seen_in_halves(const Volume& volume, const SeenRanges&
                         ((2 * block.z + z) * 2 * blocks.y + 2 * block.y + y) * 2 * blocks.x + 2 * block.x +
                         x)] = can_be_seen(least[z][y][x], most[z][y][x]);
     };
-    tbb::parallel_for(std::int64_t{0}, blocks.z, [&](std::int64_t z) {
+    in_parallel(blocks.z, [&](std::int64_t z) {
         for (std::int64_t y = 0; y < blocks.y; ++y)
             for (std::int64_t x = 0; x < blocks.x; ++x)
                 if (space.visible(low.x + x, low.y + y, low.z + z)) look(Index3(x, y, z));

@@ -1,9 +1,8 @@
 #include "pipeline/machines/lanes/near_walls.h"
 
+#include "core/parallel.h"
 #include "pipeline/kept.h"
 #include "pipeline/stages/faces.h"
-
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 
@@ -62,7 +61,7 @@ void mark_about(NearWalls& near) {
                     if (const std::int64_t two = 2 * y - 1 + reach; two >= 0 && two < 2 * n.y)
                         mark_row(layer * 2 * n.y + two, 2 * x - 1, twos);
     };
-    tbb::parallel_for(std::int64_t{0}, 2 * n.z, [&](std::int64_t layer) {
+    in_parallel(2 * n.z, [&](std::int64_t layer) {
         const std::int64_t last = std::min(2 * layer + 2, kBlock * n.z - 1);
         for (std::int64_t z = std::max(2 * layer - 1, std::int64_t{0}); z <= last; ++z)
             for (std::int64_t y = 0; y < n.y; ++y)
@@ -82,7 +81,7 @@ NearWalls find_walls(const Volume& volume, const BlockBox& box, const WallStage&
     near.bits.assign(static_cast<std::size_t>(box.count()) * NearWalls::kWords, 0);
     const Index3 &n = box.blocks, &known = ranges->box.blocks;
     const auto mark = [&]<class T>(const BlockRanges::Of<T>& of) {
-        tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
+        in_parallel(n.z, [&](std::int64_t z) {
             for (std::int64_t y = 0; y < n.y; ++y)
                 for (std::int64_t x = 0; x < n.x; ++x) {
                     const Index3 block = box.low + Index3(x, y, z), there = block - ranges->box.low;

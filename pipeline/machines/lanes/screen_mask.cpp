@@ -1,6 +1,6 @@
 #include "pipeline/machines/lanes/screen_mask.h"
 
-#include <tbb/parallel_for.h>
+#include "core/parallel.h"
 
 #include <algorithm>
 #include <atomic>
@@ -98,7 +98,7 @@ void ScreenMask::mark(double left, double top, double right, double bottom) {
 VisibleSurface::VisibleSurface(const EmptySpace& empty)
     : box(empty.box), layers(static_cast<std::size_t>(empty.box.blocks.z)) {
     const Index3 n = box.blocks;
-    tbb::parallel_for(std::int64_t{0}, n.z, [&](std::int64_t z) {
+    in_parallel(n.z, [&](std::int64_t z) {
         const auto hidden = [&](std::int64_t x, std::int64_t y, std::int64_t layer) -> unsigned {
             const bool beyond = x < 0 || y < 0 || layer < 0 || x == n.x || y == n.y || layer == n.z;
             return beyond || !empty.visible(box.low.x + x, box.low.y + y, box.low.z + layer);
@@ -156,7 +156,7 @@ ScreenMask visible_packets(const Plan& plan, const VisibleSurface& surface) {
     if (eye_is_inside) return {};  // where rays begin nothing need be open
     const Marker marker(plan.camera, half, mask);
     std::atomic<bool> all{false};
-    tbb::parallel_for(std::size_t{0}, surface.layers.size(), [&](std::size_t z) {
+    in_parallel(surface.layers.size(), [&](std::size_t z) {
         for (const VisibleSurface::Block& block : surface.layers[z]) {
             if ((block.open & (faces[0][block.x] | faces[1][block.y] | faces[2][z])) == 0) continue;
             if (!marker.mark(Vec3(middle[0][block.x], middle[1][block.y], middle[2][z]))) all = true;

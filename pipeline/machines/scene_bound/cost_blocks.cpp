@@ -1,6 +1,6 @@
 #include "pipeline/machines/scene_bound/cost_blocks.h"
 
-#include <tbb/parallel_for.h>
+#include "core/parallel.h"
 
 #include <algorithm>
 #include <cmath>
@@ -143,7 +143,7 @@ void CostBlocks::mark_lit() {
     BlockGrid<char> marks{blocks,
                           std::vector<char>(static_cast<std::size_t>(blocks[0] * blocks[1] * blocks[2]))};
     BlockGrid<char> cost = marks;
-    tbb::parallel_for(std::int64_t{0}, blocks[2], [&](std::int64_t bz) {
+    in_parallel(blocks[2], [&](std::int64_t bz) {
         const std::int64_t z0 = spans[2].first + (bz << kMarkBits);
         for (std::int64_t z = z0; z <= std::min(z0 + (1 << kMarkBits) - 1, spans[2].last); ++z)
             for (std::int64_t y = spans[1].first; y <= spans[1].last; ++y)
@@ -168,7 +168,7 @@ void CostBlocks::mark_lit() {
 void CostBlocks::build_lowest() {
     Level& level = levels_[0];
     std::vector<CellValues> steepest(static_cast<std::size_t>(level.blocks[2]), whole_);
-    tbb::parallel_for(std::int64_t{0}, level.blocks[2], [&](std::int64_t bz) {
+    in_parallel(level.blocks[2], [&](std::int64_t bz) {
         const auto cells_of = [&](std::int64_t block, std::size_t axis) {
             const std::int64_t first = cells_.first[axis] + (block << lowest_bits_);
             return std::array{first,
@@ -205,7 +205,7 @@ void CostBlocks::build_above() {
     Level level;
     for (std::size_t a = 0; a < 3; ++a) level.blocks[a] = (below.blocks[a] + 1) / 2;
     level.block.resize(static_cast<std::size_t>(level.blocks[0] * level.blocks[1] * level.blocks[2]));
-    tbb::parallel_for(std::int64_t{0}, level.blocks[2], [&](std::int64_t z) {
+    in_parallel(level.blocks[2], [&](std::int64_t z) {
         for (std::int64_t y = 0; y < level.blocks[1]; ++y)
             for (std::int64_t x = 0; x < level.blocks[0]; ++x) {
                 Found all = below.block[below.index(2 * x, 2 * y, 2 * z)];
