@@ -22,11 +22,11 @@ namespace {
 constexpr rlim_t kParserBytes = rlim_t{2} << 30;
 constexpr rlim_t kOpenFiles = 64;
 
-// The address sanitizer takes memory of its own, more than that.
-#if defined(__SANITIZE_ADDRESS__)
+// Sanitizers of addresses and threads take memory of their own, more than that.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr bool kLimitsMemory = false;
 #elif defined(__has_feature)
-constexpr bool kLimitsMemory = !__has_feature(address_sanitizer);
+constexpr bool kLimitsMemory = !__has_feature(address_sanitizer) && !__has_feature(thread_sanitizer);
 #else
 constexpr bool kLimitsMemory = true;
 #endif
