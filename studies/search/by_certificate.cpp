@@ -1,12 +1,12 @@
 #include "studies/search/by_certificate.h"
 
-#include "core/atomic_file.h"
 #include "core/error.h"
 #include "pipeline/machines/certificate.h"
 #include "pipeline/record.h"
 #include "pipeline/render.h"
-#include "scene/toml.h"
 #include "studies/search/by_shares.h"
+#include "studies/search/result_files.h"
+#include "studies/search/scenes.h"
 #include "studies/sweep/cost.h"
 #include "studies/sweep/run_folder.h"
 
@@ -14,7 +14,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <set>
 
@@ -33,13 +32,12 @@ sweep::SweepFile sweep_of(const Settings& settings) {
 class ByCertificate {
   public:
     explicit ByCertificate(const Settings& settings)
-        : s_(settings), sweep_(sweep_of(settings)), evaluator_(sweep_, "", settings.cancelled) {}
+        : s_(settings), sweep_(sweep_of(settings)), scenes_(sweep_, "", settings.cancelled) {}
 
     CertifiedResult run() {
         read();
         sweep::make_run_folder(s_.folder);
-        const std::string file = s_.folder + "/formats.toml", record = s_.folder + "/search.json";
-        for (const std::string& old : {file, record}) std::filesystem::remove(old);
+        remove_result_files(s_.folder);
         const Pictures all = pictures();
         result_.scene = proven(own_, prove(all, own_));
         Bits bits = own_;
@@ -52,47 +50,38 @@ class ByCertificate {
         result_.found = proven(bits, proof);
         for (Proven* p : {&result_.scene, &result_.found})
             p->error = measured(p == &result_.found ? bits : own_);
-        result_.formats_file = file;
+        result_.formats_file = formats_file(s_.folder);
         result_.json = json();
-        write_text_whole(file, formats_text(bits));
-        write_text_whole(record, sweep::dump(result_.json));
+        write_formats(s_.folder, about_formats(), preset_, result_.wires, specs_of(result_.found));
+        write_search_record(s_.folder, result_.json);
         return std::move(result_);
     }
 
   private:
-    std::size_t scenes() const { return std::max<std::size_t>(sweep_.scenes.size(), 1); }
     const char* guarantee() const { return s_.every_view ? "scene" : "pictures"; }
-    std::string name_of_scene(std::size_t i) const {
-        return sweep_.scenes.empty() ? "the built-in scene" : sweep_.scenes[i];
-    }
 
     Plan plan_of(std::size_t scene, const Bits& bits, int view) {
         sweep::Point point;
         point.scene = scene;
         for (const auto& [wire, fraction] : bits)
             point.edits.push_back({wire, WireEdit::Part::fraction_bits, fraction, {}});
-        sweep::Prepared p = evaluator_.prepare(point);
-        if (!p.failure.empty()) throw InputError(p.failure);
+        sweep::Prepared p = scenes_.prepared(point);
         p.scene.camera.turntable = s_.views;
         return make_plan(p.scene, p.volume, view);
     }
 
     void read() {
         std::set<Wire> used;
-        for (std::size_t i = 0; i < scenes(); ++i) {
+        for (std::size_t i = 0; i < scenes_.count(); ++i) {
             const Plan plan = plan_of(i, {}, 0);
             if (const auto obstacle =
                     s_.every_view ? what_has_no_scene_bound(plan) : what_is_not_bounded(plan))
                 throw InputError(
-                    fmt::format("--guarantee {}: {}: {}", guarantee(), name_of_scene(i), *obstacle));
+                    fmt::format("--guarantee {}: {}: {}", guarantee(), scenes_.name(i), *obstacle));
             if (i == 0)
                 preset_ = plan.scene.precision.preset, width_ = plan.camera.width,
                 height_ = plan.camera.height;
-            if (plan.scene.precision.preset != preset_)
-                throw InputError(
-                    fmt::format("{}: preset {}, but {} has {}; allowed: one for all, as with --set "
-                                "precision.preset=default",
-                                name_of_scene(i), plan.scene.precision.preset, name_of_scene(0), preset_));
+            scenes_.check_preset(i, plan, preset_);
             for (const Wire wire : plan.used_wires) {
                 used.insert(wire);
                 const int fraction = plan.specs[wire].format.fraction_bits;
@@ -100,24 +89,20 @@ class ByCertificate {
                 found->second = std::max(found->second, fraction);
             }
         }
-        for (const Wire wire : s_.wires)
-            if (!used.contains(wire))
-                throw InputError(fmt::format("--wires: {} carries nothing in {}", info(wire).name,
-                                             scenes() > 1 ? "these scenes" : "this scene"));
-        result_.wires = s_.wires.empty() ? std::vector<Wire>(used.begin(), used.end()) : s_.wires;
+        result_.wires = scenes_.chosen(s_.wires, used);
         std::erase_if(own_, [&](const auto& item) {
             return std::find(result_.wires.begin(), result_.wires.end(), item.first) == result_.wires.end();
         });
-        result_.pictures = scenes() * static_cast<std::size_t>(s_.views);
+        result_.pictures = scenes_.count() * static_cast<std::size_t>(s_.views);
         for (int view = 0; view < s_.views; ++view) result_.degrees.push_back(360.0 * view / s_.views);
     }
 
     // The tally's figure, or none where no word holds these.
     double cost(const Bits& bits) {
         double sum = 0;
-        for (std::size_t scene = 0; scene < scenes(); ++scene)
+        for (std::size_t scene = 0; scene < scenes_.count(); ++scene)
             sum += static_cast<double>(sweep::cost_of(plan_of(scene, bits, 0)).bits());
-        return sum / static_cast<double>(scenes());
+        return sum / static_cast<double>(scenes_.count());
     }
     Proven proven(const Bits& bits, const Proof& proof) {
         return {plan_of(0, bits, 0).specs, cost(bits), proof.most, 0, proof.rays, proof.undecided};
@@ -136,12 +121,12 @@ class ByCertificate {
         all.least = least_bits(plan_of(0, {}, 0));
         all.certificate = {.threads = s_.threads, .cancelled = s_.cancelled};
         if (s_.every_view) {
-            all.count = scenes();
+            all.count = scenes_.count();
             all.plan = [this](const Bits& bits, std::size_t i) { return plan_of(i, bits, 0); };
             all.every_view = {.threads = s_.threads, .most_beams = kBeamsOnTheWay, .cancelled = s_.cancelled};
         }
         all.proven = [this](const Proof& proof) {
-            result_.certificates += s_.every_view ? scenes() : result_.pictures;
+            result_.certificates += s_.every_view ? scenes_.count() : result_.pictures;
             for (const Wire wire : result_.wires)
                 if (proof.worst[static_cast<int>(wire)] > proof.worst[static_cast<int>(result_.binding)])
                     result_.binding = wire;
@@ -164,7 +149,7 @@ class ByCertificate {
 
     double measured(const Bits& bits) {
         double most = 0;
-        for (std::size_t scene = 0; scene < scenes(); ++scene)
+        for (std::size_t scene = 0; scene < scenes_.count(); ++scene)
             for (int view = 0; view < s_.views; ++view) {
                 const Plan plan = plan_of(scene, bits, view);
                 RenderOptions options;
@@ -176,42 +161,39 @@ class ByCertificate {
         return most;
     }
 
-    std::string formats_text(const Bits& bits) const {
-        std::string text =
-            s_.every_view
-                ? fmt::format(
-                      "# By squint search --guarantee scene: no pixel of any view of {} can err by more "
-                      "than\n# {:.4g} LSB8 by rounding, proven.  Nothing is proven of other data.\n"
-                      "#   squint plan SCENE --set precision.preset=THIS_FILE --bound\n"
-                      "[precision]\npreset = \"{}\"\n",
-                      name_of_scene(0), result_.found.bound, preset_)
-                : fmt::format(
-                      "# By squint search --guarantee pictures: no pixel of {} pictures ({} x {} pixels, {}) "
-                      "can err "
-                      "by more than\n"
-                      "# {:.4g} LSB8 by rounding, proven.  Nothing is proven of other views, sizes or data.\n"
-                      "#   squint render SCENE --set precision.preset=THIS_FILE --bound\n"
-                      "[precision]\npreset = \"{}\"\n",
-                      result_.pictures, width_, height_, name_of_scene(0), result_.found.bound, preset_);
-        for (const auto& item : bits)
-            text += fmt::format("{} = \"{}\"\n", info(item.first).name,
-                                to_string(result_.found.specs[item.first]));
-        return text;
+    std::vector<Spec> specs_of(const Proven& p) const {
+        std::vector<Spec> specs;
+        for (const Wire wire : result_.wires) specs.push_back(p.specs[wire]);
+        return specs;
+    }
+    std::string about_formats() const {
+        return s_.every_view
+                   ? fmt::format(
+                         "# By squint search --guarantee scene: no pixel of any view of {} can err by more "
+                         "than\n# {:.4g} LSB8 by rounding, proven.  Nothing is proven of other data.\n"
+                         "#   squint plan SCENE --set precision.preset=THIS_FILE --bound\n",
+                         scenes_.name(0), result_.found.bound)
+                   : fmt::format(
+                         "# By squint search --guarantee pictures: no pixel of {} pictures ({} x {} pixels, "
+                         "{}) "
+                         "can err "
+                         "by more than\n"
+                         "# {:.4g} LSB8 by rounding, proven.  Nothing is proven of other views, sizes or "
+                         "data.\n"
+                         "#   squint render SCENE --set precision.preset=THIS_FILE --bound\n",
+                         result_.pictures, width_, height_, scenes_.name(0), result_.found.bound);
     }
     Json json() {
         const auto proven = [&](const Proven& p) {
-            Json json{{"bits", p.bits}, {"bound_lsb8", p.bound},         {"error_lsb8", p.error},
-                      {"rays", p.rays}, {"undecided_rays", p.undecided}, {"wires", Json::object()}};
-            for (const Wire wire : result_.wires)
-                json["wires"][std::string(info(wire).name)] = to_string(p.specs[wire]);
-            return json;
+            return Json{{"bits", p.bits},
+                        {"bound_lsb8", p.bound},
+                        {"error_lsb8", p.error},
+                        {"rays", p.rays},
+                        {"undecided_rays", p.undecided},
+                        {"wires", formats_record(result_.wires, specs_of(p))}};
         };
-        Json json{{"schema", "squint.search/1"}};
-        json.update(sweep::program_record());
-        json.update({{"command", s_.command},
-                     {"scenes", sweep_.scenes},
-                     {"max_error_lsb8", s_.most_error},
-                     {"guarantee", guarantee()},
+        Json json = begin_record(s_);
+        json.update({{"guarantee", guarantee()},
                      {"degrees", result_.degrees},
                      {"certificates", result_.certificates},
                      {"preset", preset_},
@@ -223,7 +205,7 @@ class ByCertificate {
 
     const Settings& s_;
     sweep::SweepFile sweep_;
-    sweep::Evaluator evaluator_;
+    Scenes scenes_;
     std::string preset_;
     Bits own_;
     int width_ = 0, height_ = 0;
