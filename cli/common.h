@@ -2,6 +2,7 @@
 #pragma once
 
 #include "cli/common_flags.h"
+#include "core/parallel.h"
 #include "pipeline/plan/asked.h"
 
 #include <nlohmann/json_fwd.hpp>
@@ -28,6 +29,14 @@ void say(std::string_view text);
 void print_json(const nlohmann::ordered_json& json, int indent = 2);
 /// Writes to a file, whole or not at all, or to standard output for -.
 void write_json(const std::string& path, const nlohmann::ordered_json& json);
+
+/// What `run` returns, with all its work in parallel on so many threads; 0: one a processor.
+template <class Run>
+int on_threads_asked_for(int threads, const Run& run) {
+    int code = kDone;
+    on_threads(threads, [&] { code = run(); });
+    return code;
+}
 
 /// scene_asked_for(), and @NAME means a scene that comes with squint; its transfer function may be missing until
 /// load_and_complete().

@@ -318,7 +318,7 @@ std::string default_output(const RenderArguments& a) {
     return a.scene.file.empty() ? "squint.exr" : std::filesystem::path(a.scene.file).stem().string() + ".exr";
 }
 
-int run(const RenderArguments& a) {
+int run_on_these_threads(const RenderArguments& a) {
     if (a.scene_reference) return print(scene_reference_markdown()), kDone;
     std::string output = a.output.empty() ? default_output(a) : a.output, preview = a.preview;
     check_output(output, "-o", kPictures);
@@ -372,6 +372,10 @@ int run(const RenderArguments& a) {
     for (Json& picture : pictures) picture.erase("wires"), record["pictures"].push_back(picture);
     write_json(a.json, record);
     return kDone;
+}
+
+int run(const RenderArguments& a) {
+    return on_threads_asked_for(a.options.threads, [&] { return run_on_these_threads(a); });
 }
 
 void flags(Flags& f, RenderArguments& a) {

@@ -157,7 +157,7 @@ Result made(const Order& order, const ReproduceArguments& a) {
     return result;
 }
 
-int run(const ReproduceArguments& a) {
+int run_on_these_threads(const ReproduceArguments& a) {
     if (!a.data.empty()) setenv("SQUINT_DATA", a.data.c_str(), 1);
     const std::vector<Paper> papers = all_papers();
     if (a.paper.empty()) return list(papers, a.json);
@@ -179,6 +179,10 @@ int run(const ReproduceArguments& a) {
     }
     if (a.json) print_json(all);
     return some_failed ? kSomeFailed : kDone;
+}
+
+int run(const ReproduceArguments& a) {
+    return on_threads_asked_for(a.threads, [&] { return run_on_these_threads(a); });
 }
 
 void flags(Flags& f, ReproduceArguments& a) {

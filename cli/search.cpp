@@ -115,7 +115,7 @@ int told(const SearchArguments& a, const search::Settings& settings, const Resul
     return kDone;
 }
 
-int run(const SearchArguments& a) {
+int run_on_these_threads(const SearchArguments& a) {
     search::Settings settings = a.settings;
     for (std::string& scene : settings.scenes) scene = file_of(scene);
     settings.cancelled = &interrupted;
@@ -139,6 +139,10 @@ int run(const SearchArguments& a) {
     const search::Result result = run_search(settings);
     line.clear();
     return told(a, settings, result);
+}
+
+int run(const SearchArguments& a) {
+    return on_threads_asked_for(a.settings.threads, [&] { return run_on_these_threads(a); });
 }
 
 void flags(Flags& f, SearchArguments& a) {

@@ -50,7 +50,7 @@ int say_forecast(const SweepFile& sweep, const RunOptions& options) {
     return kDone;
 }
 
-int run(const SweepArguments& a) {
+int run_on_these_threads(const SweepArguments& a) {
     if (a.collect) return join(a);
     if (a.files.size() != 1)
         throw InputError(fmt::format(
@@ -80,6 +80,10 @@ int run(const SweepArguments& a) {
     if (!a.quiet && !s.first_failure.empty())
         say(fmt::format("the first that failed: {}\n", s.first_failure));
     return s.failed > 0 ? kSomeFailed : kDone;
+}
+
+int run(const SweepArguments& a) {
+    return on_threads_asked_for(a.threads, [&] { return run_on_these_threads(a); });
 }
 
 void flags(Flags& f, SweepArguments& a) {

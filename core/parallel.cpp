@@ -7,7 +7,6 @@
 
 #include <mutex>
 #include <optional>
-#include <thread>
 
 namespace squint {
 namespace {
@@ -27,7 +26,7 @@ void allow(int threads) {
 }  // namespace
 
 int threads_for(int asked) {
-    return asked > 0 ? asked : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    return asked > 0 ? asked : tbb::this_task_arena::max_concurrency();
 }
 
 void on_threads(int threads, const std::function<void()>& work) {

@@ -10,7 +10,8 @@
 
 namespace squint {
 
-/// As many as are asked for; where that is 0, one a processor.
+/// As many as are asked for; where that is 0, as many as loops take here: within on_threads() its number, else one a
+/// processor.
 int threads_for(int asked);
 
 /// Runs `work` so that all its parallel loops together take threads_for(threads) threads, the caller's among

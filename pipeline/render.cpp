@@ -80,15 +80,7 @@ void clear(const Tile& tile, Image& image) {
     for (Channel& channel : image.channels) zero(channel.values), zero(channel.words);
 }
 
-}  // namespace
-
-Rendering render(const Plan& plan, const RenderOptions& options) {
-    Rendering result;
-    render(plan, options, result);
-    return result;
-}
-
-void render(const Plan& plan, const RenderOptions& options, Rendering& into) {
+void render_on_these_threads(const Plan& plan, const RenderOptions& options, Rendering& into) {
     Image& image = into.image;
     const std::vector<ChannelKind> kinds = channels_of(plan.scene.output);
     const bool is_used = is_such(image, plan.camera.width, plan.camera.height, kinds);
@@ -97,7 +89,7 @@ void render(const Plan& plan, const RenderOptions& options, Rendering& into) {
 
     RenderStatistics& statistics = into.statistics;
     statistics = {};
-    statistics.threads = threads_for(options.threads);
+    statistics.threads = threads_for(0);
     const std::vector<Tile> tiles = tiles_of(image.width, image.height, std::max(1, options.tile));
     std::vector<TileStatistics> per_tile(tiles.size());
     std::atomic<std::size_t> done{0};
@@ -119,20 +111,17 @@ void render(const Plan& plan, const RenderOptions& options, Rendering& into) {
         std::chrono::duration<double>(std::chrono::steady_clock::now() - setup_start).count();
 
     const auto start = std::chrono::steady_clock::now();
-    on_threads(statistics.threads, [&] {
-        in_parallel(tiles.size(), [&](std::size_t i) {
-            if (options.cancelled && *options.cancelled) stopped = true;
-            if (stopped) return;
-            const Tile& t = tiles[i];
-            if (is_used) clear(t, image);
-            if (fast)
-                fast->render_tile(t.left, t.top, t.right, t.bottom, image, per_tile[i]);
-            else
-                model.render_tile(t.left, t.top, t.right, t.bottom, image, per_tile[i]);
-            const std::size_t now = ++done;
-            if (options.progress)
-                options.progress(static_cast<double>(now) / static_cast<double>(tiles.size()));
-        });
+    in_parallel(tiles.size(), [&](std::size_t i) {
+        if (options.cancelled && *options.cancelled) stopped = true;
+        if (stopped) return;
+        const Tile& t = tiles[i];
+        if (is_used) clear(t, image);
+        if (fast)
+            fast->render_tile(t.left, t.top, t.right, t.bottom, image, per_tile[i]);
+        else
+            model.render_tile(t.left, t.top, t.right, t.bottom, image, per_tile[i]);
+        const std::size_t now = ++done;
+        if (options.progress) options.progress(static_cast<double>(now) / static_cast<double>(tiles.size()));
     });
     if (stopped) throw Cancelled{};
     statistics.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -145,15 +134,26 @@ void render(const Plan& plan, const RenderOptions& options, Rendering& into) {
     }
 }
 
+}  // namespace
+
+Rendering render(const Plan& plan, const RenderOptions& options) {
+    Rendering result;
+    render(plan, options, result);
+    return result;
+}
+
+void render(const Plan& plan, const RenderOptions& options, Rendering& into) {
+    on_threads(options.threads, [&] { render_on_these_threads(plan, options, into); });
+}
+
 Image render_thinned(const Plan& plan, const RenderOptions& options, int every) {
     if (every == 1) return render(plan, options).image;
     Image image = blank(plan.camera.width, plan.camera.height, channels_of({}));
-    ModelRenderer model(plan);
-    if (options.skip) model.skip_empty_space(lanes::room_of(options));
     std::atomic<bool> stopped{false};
-    const int rows = thinned_size(image.height, every);
     on_threads(options.threads, [&] {
-        in_parallel(rows, [&](int i) {
+        ModelRenderer model(plan);
+        if (options.skip) model.skip_empty_space(lanes::room_of(options));
+        in_parallel(thinned_size(image.height, every), [&](int i) {
             if (options.cancelled && *options.cancelled) stopped = true;
             const int row = i * every + every / 2;
             for (int column = every / 2; column < image.width && !stopped; column += every) {

@@ -66,6 +66,17 @@ TEST(Parallel, OneThreadIsTheCallers) {
     EXPECT_EQ(threads, std::set<std::thread::id>{std::this_thread::get_id()});
 }
 
+TEST(Parallel, NoughtIsOneAProcessorOrAsManyAsThereAreAround) {
+    EXPECT_EQ(threads_for(0), static_cast<int>(std::thread::hardware_concurrency()));
+    EXPECT_EQ(threads_for(5), 5);
+    on_threads(3, [] {
+        EXPECT_EQ(threads_for(0), 3);
+        on_threads(0, [] { EXPECT_EQ(threads_for(0), 3); });
+        on_threads(2, [] { EXPECT_EQ(threads_for(0), 2); });
+        EXPECT_EQ(threads_for(5), 5);
+    });
+}
+
 #ifdef __SANITIZE_THREAD__
 /// Two turns at once, in each of which `touch` is called.
 template <class F>
