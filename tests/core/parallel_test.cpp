@@ -78,15 +78,20 @@ TEST(Parallel, NoughtIsOneAProcessorOrAsManyAsThereAreAround) {
 }
 
 #ifdef __SANITIZE_THREAD__
-/// Two turns at once, in each of which `touch` is called.
+/// Two turns at once; turn 1 calls touch(1) after turn 0 has called touch(0), which nothing tells the sanitizer.
 template <class F>
 void touch_from_two_turns(const F& touch) {
-    std::atomic<int> there{0};
+    std::atomic<int> begun{0}, touched{0};
+    const auto wait_for = [](const std::atomic<int>& count, int much) {
+        while (count.load(std::memory_order_relaxed) < much) std::this_thread::yield();
+    };
     on_threads(2, [&] {
         in_parallel(2, [&](int i) {
-            there.fetch_add(1, std::memory_order_relaxed);
-            while (there.load(std::memory_order_relaxed) < 2) std::this_thread::yield();
+            begun.fetch_add(1, std::memory_order_relaxed);
+            wait_for(begun, 2);
+            wait_for(touched, i);
             touch(i);
+            touched.fetch_add(1, std::memory_order_relaxed);
         });
     });
 }
