@@ -427,7 +427,10 @@ Outcome interrupt(const fs::path& folder, const std::string& arguments, int sign
     const std::string line =
         "cd '" + folder.string() + "' && exec '" SQUINT_PROGRAM "' " + arguments + " >.stdout 2>.stderr";
     const pid_t child = fork();
-    if (child == 0) execl("/bin/sh", "sh", "-c", line.c_str(), nullptr), _exit(127);
+    if (child == 0) {
+        std::signal(signal, SIG_DFL);  // a shell's background work ignores SIGINT, and so would this
+        execl("/bin/sh", "sh", "-c", line.c_str(), nullptr), _exit(127);
+    }
     const auto listens = [&] {
         std::ifstream status("/proc/" + std::to_string(child) + "/status");
         for (std::string word; status >> word;) {
