@@ -174,7 +174,7 @@ struct Shift {
     std::int64_t operator()(T voxel, std::int64_t, std::int64_t& clamped) const {
         if constexpr (std::is_same_v<T, std::uint64_t>)
             voxel = std::min<T>(voxel, std::numeric_limits<std::int64_t>::max());
-        const auto value = static_cast<std::int64_t>(voxel);
+        const auto value = static_cast<std::int64_t>(voxel);  // NOLINT: voxels are numbers
         clamped += value < least || value > greatest;
         return std::clamp(value, least, greatest) - least;
     }
@@ -342,7 +342,7 @@ std::pair<std::int64_t, std::int64_t> measured_range(const StoredVolume& stored)
             stored, Range{kMost, std::numeric_limits<std::int64_t>::min()},
             [](Range& r, T v) {
                 if constexpr (std::is_same_v<T, std::uint64_t>) v = std::min<T>(v, kMost);
-                const auto number = static_cast<std::int64_t>(v);
+                const auto number = static_cast<std::int64_t>(v);  // NOLINT: voxels are numbers
                 r.first = std::min(r.first, number), r.second = std::max(r.second, number);
             },
             [](const Range& a, const Range& b) {
