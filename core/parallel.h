@@ -10,12 +10,10 @@
 
 namespace squint {
 
-/// As many as are asked for; where that is 0, as many as loops take here: within on_threads() its number, else one a
-/// processor.
+/// `asked`, or where that is 0 as many threads as loops take here: on_threads()'s, else one a processor.
 int threads_for(int asked);
 
-/// Runs `work` so that all its parallel loops together take threads_for(threads) threads, the caller's among
-/// them.
+/// Runs `work`, whose parallel loops together take threads_for(threads) threads, one of them the caller's.
 void on_threads(int threads, const std::function<void()>& work);
 
 /// Runs `work`, which holds a lock: a thread that waits in its loops takes up turns of these loops alone, as

@@ -175,9 +175,7 @@ class ByCertificate {
                          scenes_.name(0), result_.found.bound)
                    : fmt::format(
                          "# By squint search --guarantee pictures: no pixel of {} pictures ({} x {} pixels, "
-                         "{}) "
-                         "can err "
-                         "by more than\n"
+                         "{}) can err by more than\n"
                          "# {:.4g} LSB8 by rounding, proven.  Nothing is proven of other views, sizes or "
                          "data.\n"
                          "#   squint render SCENE --set precision.preset=THIS_FILE --bound\n",

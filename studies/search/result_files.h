@@ -19,7 +19,7 @@ void remove_result_files(const std::string& folder);
 /// Throws InputError where it cannot be written, as the next does.
 void write_formats(const std::string& folder, const std::string& about, const std::string& preset,
                    const std::vector<Wire>& wires, const std::vector<Spec>& specs);
-/// search.json.
+/// search.json: the record, as docs/sweeps.md lists it.
 void write_search_record(const std::string& folder, const sweep::Json& record);
 
 /// The head of squint.search/1: schema, program, command, scenes and the bound asked for.

@@ -178,8 +178,7 @@ class Searcher {
             if (tried_.sets() == kMostSets) {
                 result_.failure = fmt::format(
                     "--max-error: found {:g}, but every one of {} sets of {} views held out breaks it; "
-                    "allowed: a "
-                    "higher bound, or more --views to tune on",
+                    "allowed: a higher bound, or more --views to tune on",
                     s_.most_error, kMostSets, TriedPictures::held_out_a_set(s_));
                 found.feasible = false;
                 return;

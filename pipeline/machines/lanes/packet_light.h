@@ -247,7 +247,7 @@ class PacketLight {
         for (int c = 0; c < 3; ++c) std::copy_n(from.color[c].v + at, count, to.color[c].v + there);
     }
 
-    // for_pieces of gathered gradients.
+    // As for_pieces() does (stages/inside-inl.h), to gradients that were gathered.
     void lengthen_gradients(int count, int by, LitSamples& lit) const {
         const auto lengthen = [by](auto word, Word& bits) {
             word_from_bits(bits, word);
@@ -259,8 +259,7 @@ class PacketLight {
                               : lengthen(std::int64_t{}, lit.gradient[a].v[i]);
     }
 
-    // Fetches what the gradients of the first `count` packed places need: voxels, or the six samples around
-    // each place.
+    // Fetches what gradients of the first `count` packed places need: voxels, or six samples around each.
     void look_around(int count, LitSamples& lit) {
         if (!plan_.gradient_from_samples()) {
             gradients_ += count;
