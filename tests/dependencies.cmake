@@ -1,6 +1,7 @@
 # Includes run one way: fixedpoint, core <- scene <- pipeline <- truth <- studies <- cli, python, bench.  Inside pipeline
 # the stages, the methods and the plan know no machine.  Highway stays in -inl.h files, in machines and in files
-# compiled once per target; a header with data includes neither.  Parallel loops are core/parallel.h's.
+# compiled once per target; a header with data includes neither.  Parallel loops are core/parallel.h's.  Tests run at once,
+# so each writes in a folder of its own: tests/own_folder.h's.
 #   cmake -DSOURCE=<tree> -P tests/dependencies.cmake
 cmake_minimum_required(VERSION 3.20)
 
@@ -57,6 +58,13 @@ foreach(room fixedpoint core scene pipeline truth studies cli python bench)
       endif()
     endforeach()
   endforeach()
+endforeach()
+file(GLOB_RECURSE files RELATIVE ${SOURCE} ${SOURCE}/tests/*.h ${SOURCE}/tests/*.cpp)
+foreach(file ${files})
+  file(STRINGS ${SOURCE}/${file} lines REGEX "TempDir|temp_directory_path|mkdtemp|[( ]\"/tmp")
+  if(lines AND NOT file STREQUAL "tests/own_folder.h")
+    complain(${file} "writes where other tests may: test::OwnFolder of tests/own_folder.h is a test's own")
+  endif()
 endforeach()
 if(looked_at LESS 100)
   message(FATAL_ERROR "dependencies: ${looked_at} files found under ${SOURCE}: not a tree of squint")

@@ -6,10 +6,7 @@ namespace {
 
 class OwnFile : public Program {
   protected:
-    void SetUp() override {
-        Program::SetUp();
-        ASSERT_EQ(squint("volume phantom --dims 24 --bits 12 -o scan.nrrd").code, 0);
-    }
+    void SetUp() override { ASSERT_EQ(squint("volume phantom --dims 24 --bits 12 -o scan.nrrd").code, 0); }
     std::string hash_of(const std::string& arguments) const {
         const Outcome outcome = squint("render " + arguments + " -q --size 24x16 --json -");
         EXPECT_EQ(outcome.code, 0) << outcome.err;

@@ -1,6 +1,8 @@
 // Runs the squint program as a user would: through the shell, in an empty folder.
 #pragma once
 
+#include "tests/own_folder.h"
+
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <nlohmann/json.hpp>
@@ -27,16 +29,9 @@ struct Outcome {
     nlohmann::json json() const { return nlohmann::json::parse(out); }
 };
 
-/// A test's own folder, removed afterwards; the program runs in it.
+/// A test whose program runs in a folder of its own.
 class Program : public ::testing::Test {
   protected:
-    void SetUp() override {
-        std::string name = (fs::temp_directory_path() / "squint-test-XXXXXX").string();
-        ASSERT_NE(mkdtemp(name.data()), nullptr);
-        folder = name;
-    }
-    void TearDown() override { fs::remove_all(folder); }
-
     /// `squint ARGUMENTS` as typed.
     Outcome squint(const std::string& arguments) const { return shell("\"$SQUINT\" " + arguments); }
     /// A line for sh, with $SQUINT for the program.
@@ -71,7 +66,7 @@ class Program : public ::testing::Test {
         EXPECT_EQ(outcome.out, "");
     }
 
-    fs::path folder;
+    const OwnFolder folder;
 };
 
 /// A picture that takes milliseconds, full of the volume.

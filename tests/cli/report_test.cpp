@@ -13,7 +13,6 @@ class ReportProgram : public Program {
   protected:
     // 3 points, one of which fails, and a title that asks for quotes.
     void SetUp() override {
-        Program::SetUp();
         write(
             "s.toml",
             "title = 'Color, \"3\" ways | <b>'\n[base]\nvolume.dims = 12\nimage.width = 12\nimage.height = "

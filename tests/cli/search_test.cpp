@@ -13,10 +13,7 @@ const std::string kQuick = " --views 1 --restarts 1 --wires color,transparency,c
 
 class SearchProgram : public Program {
   protected:
-    void SetUp() override {
-        Program::SetUp();
-        write("s.toml", kScene);
-    }
+    void SetUp() override { write("s.toml", kScene); }
 };
 
 TEST_F(SearchProgram, WritesFormatsThatRenderToThePictureItJudged) {

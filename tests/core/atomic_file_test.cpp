@@ -1,6 +1,7 @@
 #include "core/atomic_file.h"
 
 #include "core/error.h"
+#include "tests/own_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -25,13 +26,6 @@ using testing::Not;
 
 class AtomicFile : public testing::Test {
   protected:
-    void SetUp() override {
-        std::string name = (fs::temp_directory_path() / "squint-atomic-XXXXXX").string();
-        ASSERT_NE(mkdtemp(name.data()), nullptr);
-        folder = name;
-    }
-    void TearDown() override { fs::remove_all(folder); }
-
     std::size_t files() const {
         return static_cast<std::size_t>(
             std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
@@ -50,7 +44,7 @@ class AtomicFile : public testing::Test {
         return "no error";
     }
 
-    fs::path folder;
+    const test::OwnFolder folder;
 };
 
 TEST_F(AtomicFile, AppearsWholeAndLeavesNothingElse) {

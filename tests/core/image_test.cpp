@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "core/exr_header.h"
 #include "core/srgb.h"
+#include "tests/own_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +11,6 @@
 
 #include <cmath>
 #include <csignal>
-#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <filesystem>
@@ -24,23 +24,9 @@ namespace {
 using namespace squint;
 using testing::HasSubstr;
 
-/// An empty folder that goes away.
-class Folder {
-  public:
-    Folder() {
-        std::string name = testing::TempDir() + "squint_image_XXXXXX";
-        if (!mkdtemp(name.data())) throw std::runtime_error("no temporary folder");
-        path_ = name;
-    }
-    ~Folder() { std::filesystem::remove_all(path_); }
-    std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-    std::size_t files() const {
-        return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(path_), {}));
-    }
-
-  private:
-    std::filesystem::path path_;
-};
+std::size_t files_in(const std::filesystem::path& folder) {
+    return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(folder), {}));
+}
 
 std::string bytes_of(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
@@ -72,7 +58,7 @@ std::string message(const Call& call) {
 }
 
 TEST(Exr, EveryFloatAndEveryWordComesBackBitForBit) {
-    const Folder folder;
+    const test::OwnFolder folder;
     const Image image = picture();
     write_exr(image, folder / "a.exr", {{"squint:scene", "line one\nline two"}, {"squint:version", "0.1"}});
     Attributes attributes;
@@ -92,7 +78,7 @@ TEST(Exr, EveryFloatAndEveryWordComesBackBitForBit) {
 }
 
 TEST(Exr, TwoRunsAtDifferentTimesAndPlacesWriteTheSameBytes) {
-    const Folder folder;
+    const test::OwnFolder folder;
     write_exr(picture(), folder / "a.exr", {{"squint:scene", "x"}});
     std::filesystem::create_directory(folder / "deeper");
     const std::time_t started = std::time(nullptr);
@@ -104,7 +90,7 @@ TEST(Exr, TwoRunsAtDifferentTimesAndPlacesWriteTheSameBytes) {
 }
 
 TEST(Exr, AFolderThatCannotBeWrittenIsNamedAndNothingRemains) {
-    const Folder folder;
+    const test::OwnFolder folder;
     EXPECT_THAT(message([&] { write_exr(picture(), folder / "absent/a.exr", {}); }),
                 HasSubstr("absent/a.exr"));
     EXPECT_THAT(message([&] {
@@ -115,11 +101,11 @@ TEST(Exr, AFolderThatCannotBeWrittenIsNamedAndNothingRemains) {
     torn.channels[2].values.pop_back();
     EXPECT_THAT(message([&] { write_exr(torn, folder / "a.exr", {}); }),
                 HasSubstr("channel B has not 37 x 23 values"));
-    EXPECT_EQ(folder.files(), 0u);
+    EXPECT_EQ(files_in(folder), 0u);
 }
 
 TEST(Exr, AFullDiskIsReportedAndNothingRemainsForPicturesAndPreviews) {
-    const Folder folder;
+    const test::OwnFolder folder;
     const double black[3] = {0, 0, 0};
     // Files of this process may not grow beyond 4 kB for a moment: less than either picture needs.
     rlimit before{};
@@ -133,7 +119,7 @@ TEST(Exr, AFullDiskIsReportedAndNothingRemainsForPicturesAndPreviews) {
     std::signal(SIGXFSZ, handler);
     EXPECT_THAT(exr, HasSubstr("a.exr: cannot write"));
     EXPECT_THAT(png, HasSubstr("a.png: cannot write"));
-    EXPECT_EQ(folder.files(), 0u);
+    EXPECT_EQ(files_in(folder), 0u);
 }
 
 TEST(Srgb, TheCurveAndItsInverseMeet) {
@@ -149,7 +135,7 @@ TEST(Srgb, TheCurveAndItsInverseMeet) {
 }
 
 TEST(Preview, CodesAreTheNearestToTheSrgbCurveAndHalvesRoundUp) {
-    const Folder folder;
+    const test::OwnFolder folder;
     Image image{4096, 1, {}};
     for (const char* name : {"R", "G", "B"}) {
         float next = 0;
@@ -167,7 +153,7 @@ TEST(Preview, CodesAreTheNearestToTheSrgbCurveAndHalvesRoundUp) {
 }
 
 TEST(Preview, PutsTheBackgroundUnderPremultipliedColour) {
-    const Folder folder;
+    const test::OwnFolder folder;
     Image image{4, 1, {}};
     image.add_float("A").values = {0, 0.5f, 1, 0.25f};
     image.add_float("B").values = {0, 0, 0, 9};
@@ -188,11 +174,11 @@ TEST(Preview, PutsTheBackgroundUnderPremultipliedColour) {
                                       background);
                 }),
                 HasSubstr("no channel R"));
-    EXPECT_EQ(folder.files(), 1u);
+    EXPECT_EQ(files_in(folder), 1u);
 }
 
 TEST(ReadImage, WhatCannotBeReadIsOneLineThatNamesTheFile) {
-    const Folder folder;
+    const test::OwnFolder folder;
     const auto refused = [&](const std::string& name) {
         return message([&] { (void)read_image(folder / name); });
     };
@@ -220,7 +206,7 @@ void put(std::string& bytes, std::size_t at, std::uint32_t number) {
 }
 
 TEST(ReadImage, AnExrThatClaimsMoreThanItHoldsIsRefusedBeforeMemoryIsTaken) {
-    const Folder folder;
+    const test::OwnFolder folder;
     write_exr(picture(), folder / "whole.exr", {{"squint.scene", "x"}});
     const std::string whole = bytes_of(folder / "whole.exr");
     const long before = most_resident_kilobytes();
@@ -266,7 +252,7 @@ std::string word(std::uint32_t number) {
 // a list of channels that is longer than said made it ask for 1.8 GB, for a file of 400 bytes.
 TEST(ReadImage, AnExrAttributeThatDoesNotEndWhereItSaysIsRefused) {
     using namespace std::string_literals;
-    const Folder folder;
+    const test::OwnFolder folder;
     write_exr(picture(), folder / "whole.exr", {});
     const std::string whole = bytes_of(folder / "whole.exr");
     const auto refusal = [&](const std::string& type, const std::string& value) {
@@ -328,7 +314,7 @@ TEST(ReadImage, AnExrAttributeThatDoesNotEndWhereItSaysIsRefused) {
 }
 
 TEST(ReadImage, APictureKnowsItsPlaceAndSeveralInAFileAreRefused) {
-    const Folder folder;
+    const test::OwnFolder folder;
     write_exr(picture(), folder / "a.exr", {});
     EXPECT_EQ(read_image(folder / "a.exr").left, 0);
     const std::string whole = bytes_of(folder / "a.exr");
@@ -355,7 +341,7 @@ TEST(ReadImage, APictureKnowsItsPlaceAndSeveralInAFileAreRefused) {
 }
 
 TEST(Preview, IsTheOneThatItsPictureShows) {
-    const Folder folder;
+    const test::OwnFolder folder;
     const double background[3] = {0.25, 0.5, 1};
     Image image = picture();
     write_preview_png(image, folder / "a.png", background);
@@ -367,7 +353,7 @@ TEST(Preview, IsTheOneThatItsPictureShows) {
 }
 
 TEST(ReadImage, ATornOrFlippedExrIsRefusedOrReadButNeverWorse) {
-    const Folder folder;
+    const test::OwnFolder folder;
     write_exr(picture(), folder / "whole.exr", {{"squint:scene", "x"}});
     const std::string whole = bytes_of(folder / "whole.exr");
     std::mt19937 random(3);

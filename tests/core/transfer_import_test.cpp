@@ -2,11 +2,11 @@
 
 #include "core/error.h"
 #include "core/srgb.h"
+#include "tests/own_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -31,18 +31,11 @@ const std::string kSlicer =
 /// A file of this test alone.
 class ImportTest : public testing::Test {
   protected:
-    ImportTest() {
-        std::string name = testing::TempDir() + "squint_import_XXXXXX";
-        if (!mkdtemp(name.data())) throw std::runtime_error("no temporary folder");
-        folder_ = name;
-    }
-    ~ImportTest() override { std::filesystem::remove_all(folder_); }
-
     std::string file(const std::string& text) {
         std::ofstream(path(), std::ios::binary) << text;
         return path();
     }
-    std::string path() const { return folder_ + "/function"; }
+    std::string path() const { return folder_ / "function"; }
 
     TransferFunction paraview(const std::string& text, bool srgb = false, const std::string& map = "") {
         return import_paraview_json(file(text), map, srgb, 2.5);
@@ -71,7 +64,7 @@ class ImportTest : public testing::Test {
     }
 
   private:
-    std::string folder_;
+    const test::OwnFolder folder_;
 };
 
 std::string with(std::string text, const std::string& what, const std::string& instead) {

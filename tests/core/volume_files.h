@@ -3,6 +3,7 @@
 
 #include "core/error.h"
 #include "core/volume_source.h"
+#include "tests/own_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -20,13 +21,6 @@ namespace squint {
 
 class VolumeFiles : public testing::Test {
   protected:
-    void SetUp() override {
-        std::string name = (std::filesystem::temp_directory_path() / "squint-volume-XXXXXX").string();
-        ASSERT_NE(mkdtemp(name.data()), nullptr);
-        folder = name;
-    }
-    void TearDown() override { std::filesystem::remove_all(folder); }
-
     /// Writes a file and gives its path.
     std::string file(const std::string& name, const std::string& bytes) const {
         std::filesystem::remove(folder / name);  // a new file: truncating an old one waits for the disk
@@ -66,7 +60,7 @@ class VolumeFiles : public testing::Test {
         return scalars;
     }
 
-    std::filesystem::path folder;
+    const test::OwnFolder folder;
 };
 
 template <class T>

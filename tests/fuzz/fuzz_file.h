@@ -2,12 +2,11 @@
 #pragma once
 
 #include "core/error.h"
+#include "tests/own_folder.h"
 
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
-#include <stdexcept>
 #include <string>
 
 namespace squint::fuzz {
@@ -15,15 +14,7 @@ namespace squint::fuzz {
 /// A file of this process alone, written anew for each input.
 class File {
   public:
-    explicit File(const std::string& extension) {
-        std::string name = (std::filesystem::temp_directory_path() / "squint_fuzz_XXXXXX").string();
-        if (!mkdtemp(name.data())) throw std::runtime_error("no temporary folder");
-        folder_ = name;
-        path_ = name + "/input" + extension;
-    }
-    ~File() { std::filesystem::remove_all(folder_); }
-    File(const File&) = delete;
-    File& operator=(const File&) = delete;
+    explicit File(const std::string& extension) : path_(folder_ / ("input" + extension)) {}
 
     const std::string& write(const std::uint8_t* data, std::size_t size) const {
         std::FILE* file = std::fopen(path_.c_str(), "wb");
@@ -32,8 +23,8 @@ class File {
     }
 
   private:
-    std::filesystem::path folder_;
-    std::string path_;
+    const test::OwnFolder folder_;
+    const std::string path_;
 };
 
 inline std::string text_of(const std::uint8_t* data, std::size_t size) {

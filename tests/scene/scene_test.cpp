@@ -3,13 +3,13 @@
 
 #include "core/error.h"
 #include "scene/toml.h"
+#include "tests/own_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <random>
 #include <sstream>
@@ -488,7 +488,7 @@ TEST(ScenePaths, AreRecordedAsWritten) {
 class PresetFile : public testing::Test {
   protected:
     PrecisionSettings precision(std::string_view preset_file, const std::vector<std::string>& overrides) {
-        const std::filesystem::path folder = testing::TempDir();
+        const test::OwnFolder folder;
         std::ofstream(folder / "found.toml") << preset_file;
         Scene scene = scene_of("[precision]\npreset = 'found.toml'\n", overrides);
         scene.folder = folder.string();

@@ -2,11 +2,11 @@
 #include "core/error.h"
 #include "core/srgb.h"
 #include "scene/scene.h"
+#include "tests/own_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <fstream>
 
 namespace squint {
@@ -62,7 +62,7 @@ TEST(SceneTransferFunction, ReplacesAPresetsUnitDistanceByTheScenes) {
 }
 
 TEST(SceneTransferFunction, ReadsColourMapsBesideTheScene) {
-    const std::filesystem::path folder = testing::TempDir();
+    const test::OwnFolder folder;
     std::ofstream(folder / "map.json") << R"({"RGBPoints": [0, 0, 0, 0, 9, 1, 0.5, 0]})";
     const TransferFunction map = function_of("unit_distance = 2\nfile = 'map.json'\n", folder.string());
     EXPECT_EQ(map.color.back().color, Vec3(1, 0.5, 0));

@@ -4,10 +4,10 @@
 #include "core/volume_source.h"
 #include "pipeline/machines/certificate.h"
 #include "pipeline/machines/scene_bound.h"
+#include "tests/own_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
 
@@ -19,13 +19,6 @@ using ::testing::HasSubstr;
 
 class ByCertificate : public ::testing::Test {
   protected:
-    void SetUp() override {
-        std::string name = (fs::temp_directory_path() / "squint-certified-XXXXXX").string();
-        ASSERT_NE(mkdtemp(name.data()), nullptr);
-        folder = name;
-    }
-    void TearDown() override { fs::remove_all(folder); }
-
     Settings small(double most_error) const {
         Settings s;
         s.overrides = {"volume.dims=16", "image.width=12", "image.height=10", "camera.height=16",
@@ -34,7 +27,7 @@ class ByCertificate : public ::testing::Test {
         s.folder = (folder / "run").string();
         return s;
     }
-    fs::path folder;
+    const test::OwnFolder folder;
 };
 
 TEST_F(ByCertificate, WritesFormatsWhoseCertificatesHoldForEveryPicture) {

@@ -5,14 +5,13 @@
 #include "studies/reproduce/angles.h"
 #include "studies/reproduce/figures.h"
 #include "studies/reproduce/slab_light.h"
+#include "tests/own_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <numeric>
 
@@ -79,17 +78,14 @@ TEST(GradientTurns, AnEvenRampDoesNotTurnAndAShellIsCrossedFromBothSides) {
 }
 
 std::string refusal(const std::string& text) {
-    const auto path =
-        std::filesystem::temp_directory_path() / ("squint-papers-" + std::to_string(getpid()) + ".toml");
-    std::ofstream(path) << text;
-    std::string message;
+    const test::OwnFolder folder;
+    std::ofstream(folder / "paper.toml") << text;
     try {
-        read_paper(path.string());
+        read_paper(folder / "paper.toml");
     } catch (const InputError& error) {
-        message = error.what();
+        return error.what();
     }
-    std::filesystem::remove(path);
-    return message;
+    return "";
 }
 
 TEST(Papers, WhatIsWrongInAFileIsOneLineWithItsPlace) {

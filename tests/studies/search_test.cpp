@@ -2,10 +2,10 @@
 #include "studies/search/search.h"
 #include "core/error.h"
 #include "studies/sweep/run.h"
+#include "tests/own_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -128,13 +128,6 @@ TEST(WordLengths, SayWhenNotEvenTheMostAreEnough) {
 
 class Search : public ::testing::Test {
   protected:
-    void SetUp() override {
-        std::string name = (fs::temp_directory_path() / "squint-search-XXXXXX").string();
-        ASSERT_NE(mkdtemp(name.data()), nullptr);
-        folder = name;
-    }
-    void TearDown() override { fs::remove_all(folder); }
-
     Settings small(const std::string& run) const {
         Settings s;
         s.overrides = {"volume.dims=12",   "image.width=10", "image.height=8",
@@ -147,7 +140,7 @@ class Search : public ::testing::Test {
     Json points(const std::string& run) const {
         return sweep::read_json((folder / run / "sweep.json").string())["points"];
     }
-    fs::path folder;
+    const test::OwnFolder folder;
 };
 
 TEST_F(Search, EqualsExhaustiveSearchOverThreeWires) {

@@ -6,6 +6,7 @@
 #include <sys/resource.h>
 
 #include <cstdlib>
+#include <memory>
 #include <random>
 
 namespace squint {
@@ -21,34 +22,32 @@ class Import : public VolumeFiles {
   protected:
     static void SetUpTestSuite() {
         setenv("SQUINT_READ", SQUINT_READ_PROGRAM, 1);
-        std::string name = (std::filesystem::temp_directory_path() / "squint-import-XXXXXX").string();
-        ASSERT_NE(mkdtemp(name.data()), nullptr);
-        written() = name;
+        written() = std::make_unique<const test::OwnFolder>();
         const std::string script = SQUINT_SOURCE_DIR "/tests/core/import/write_volumes.py";
         complete() =
-            std::system(("/usr/bin/python3 '" + script + "' '" + name + "' >/dev/null 2>&1").c_str()) == 0;
+            std::system(("/usr/bin/python3 '" + script + "' '" + written()->string() + "' >/dev/null 2>&1")
+                            .c_str()) == 0;
     }
-    static void TearDownTestSuite() { std::filesystem::remove_all(written()); }
+    static void TearDownTestSuite() { written() = nullptr; }
     void SetUp() override {
         if (!complete())
             GTEST_SKIP() << "python3-nibabel, python3-pydicom, teem-apps, imagemagick and openimageio-tools "
                             "write the files";
-        VolumeFiles::SetUp();
     }
-    static std::filesystem::path& written() {
-        static std::filesystem::path path;
-        return path;
+    static std::unique_ptr<const test::OwnFolder>& written() {
+        static std::unique_ptr<const test::OwnFolder> folder;
+        return folder;
     }
     static bool& complete() {
         static bool done = false;
         return done;
     }
-    static std::string at(const std::string& name) { return (written() / name).string(); }
+    static std::string at(const std::string& name) { return (*written() / name).string(); }
     /// A refusal without the folder's path.
     std::string refused(VolumeSource source) const {
         source.file = at(source.file);
         std::string message = refusal(source);
-        const std::string prefix = written().string() + "/";
+        const std::string prefix = written()->string() + "/";
         for (std::size_t i; (i = message.find(prefix)) != std::string::npos;) message.erase(i, prefix.size());
         return message;
     }

@@ -4,6 +4,7 @@
 #include "core/volume_source.h"
 #include "pipeline/record.h"
 #include "pipeline/render.h"
+#include "tests/own_folder.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -12,7 +13,6 @@
 #include <unistd.h>
 
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -48,9 +48,6 @@ std::int64_t resident_bytes() {
 class LargeVolume : public ::testing::Test {
   protected:
     void SetUp() override {
-        std::string name = (std::filesystem::temp_directory_path() / "squint-large-XXXXXX").string();
-        ASSERT_NE(mkdtemp(name.data()), nullptr);
-        folder_ = name;
         const int file = open(path().c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
         ASSERT_GE(file, 0);
         const bool sparse = ftruncate(file, kWidth * kWidth * kDepth) == 0;
@@ -67,7 +64,6 @@ class LargeVolume : public ::testing::Test {
         if (!sparse || !written || status.st_blocks * 512 > 64 << 20)
             GTEST_SKIP() << "the file system of " << folder_ << " has no sparse files of 4 GiB";
     }
-    void TearDown() override { std::filesystem::remove_all(folder_); }
 
     std::string path() const { return (folder_ / "large.raw").string(); }
 
@@ -87,7 +83,7 @@ class LargeVolume : public ::testing::Test {
         return std::make_shared<const Volume>(volume);
     }
 
-    std::filesystem::path folder_;
+    const test::OwnFolder folder_;
 };
 
 /// A look at the corner's middle, through 100 voxels of nothing.
