@@ -5,6 +5,7 @@
 //
 // Names are kernel/TARGET/case/kernel.  The time is that of one call, on a batch of 8 steps of 16 rays or on
 // as many lit samples as were drawn; `per_16` is that of 16 samples.
+#include "core/error.h"
 #include "tests/pipeline/machines/kernel_checker.h"
 
 #include <benchmark/benchmark.h>

@@ -3,22 +3,15 @@
 // bench_kernels.
 #pragma once
 
-#include "core/error.h"
-#include "core/volume_source.h"
-#include "pipeline/machines/lanes/cell_blocks.h"
-#include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/slab-inl.h"
 #include "pipeline/stages/ray_setup-inl.h"
-#include "scene/scene.h"
+#include "tests/pipeline/machines/kernel_inputs.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <functional>
-#include <memory>
-#include <random>
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -26,16 +19,6 @@
 #include <vector>
 
 namespace squint::lanes {
-
-/// A plan, its words, and where its voxels are fetched from.
-struct KernelCase {
-    std::string name;
-    Plan plan;
-    StageWays ways;
-    std::shared_ptr<CellBlocks> cells;  // none: the volume as it lies
-    VoxelSource source;
-    std::shared_ptr<LitCells> lit = nullptr;
-};
 
 /// One kernel of one case: draw() new inputs, run() it on them, and find where it differs from the model.
 struct KernelCheck {
@@ -45,93 +28,10 @@ struct KernelCheck {
     std::function<int()> samples;             // that one run() works on
 };
 
-inline KernelCase kernel_case(const std::string& name, std::vector<std::string> settings, bool in_cells) {
-    for (const char* common :
-         {"classification.method=pc", "volume.dims=[26, 23, 21]", "image.width=24", "image.height=24"})
-        settings.insert(settings.begin(), common);
-    const Scene scene = scene_with(built_in_scene(), settings);
-    const auto volume = std::make_shared<const Volume>(load_volume(volume_source(scene)));
-    KernelCase c{name + (in_cells ? ", cells" : ", linear"), make_plan(scene, volume), {}, nullptr, {}};
-    c.ways = ways_of(c.plan);
-    c.source.volume = c.plan.volume.get();
-    if (in_cells) {
-        c.cells = cell_blocks(*volume, CellBlocks::bytes_of_all(*volume), true);
-        c.cells->build([](std::int64_t block) { return block % 3 != 0; });  // some cells are put together
-        c.source.cells = c.cells->data(), c.source.blocks = c.cells->blocks();
-        c.source.slots = c.cells->slots();
-        c.source.near = c.cells->near();
-    }
-    return c;
-}
-
-/// The same with lit cells in half of the volume.
-inline KernelCase with_lit_cells(KernelCase c) {
-    c.name += " and lit cells";
-    const Volume& volume = *c.plan.volume;
-    constexpr auto kContent = CellContent::differences;
-    BlockBox half = all_blocks_of(volume);
-    half.blocks.z = (half.blocks.z + 1) / 2;
-    c.lit = std::make_shared<LitCells>(
-        half, nullptr,
-        std::make_shared<CellBlocks>(volume, CellBlocks::bytes_of_all(volume, kContent), kContent));
-    c.lit->build();
-    c.source.lit = c.lit.get();
-    return c;
-}
-
-inline std::vector<KernelCase> kernel_cases() {
-    const std::string lit = "shading.model=blinn_phong", unlit = "shading.model=none";
-    const auto method = [](const char* name) { return std::string("classification.method=") + name; };
-    std::vector<KernelCase> cases;
-    for (const bool in_cells : {true, false}) {
-        const auto add = [&](const std::string& name, std::vector<std::string> settings) {
-            cases.push_back(kernel_case(name, std::move(settings), in_cells));
-        };
-        add("default", {unlit});
-        add("default, from 0 to 1 at once",
-            {unlit,
-             "transfer_function.points=[[0, 0, 0, 1, 0.1], [900, 0, 0, 1, 0.1], [901, 1, 0, 0, 0.1]]"});
-        for (const auto& [name, more] :
-             {std::pair{"default, lit", std::vector<std::string>{}},
-              {"default, lit, 8 bits, uneven voxels", {"volume.bits=8", "volume.spacing=[1, 0.7, 1.6]"}}}) {
-            std::vector<std::string> settings{lit};
-            settings.insert(settings.end(), more.begin(), more.end());
-            add(name, settings);
-            cases.push_back(with_lit_cells(kernel_case(name, settings, in_cells)));
-        }
-        add("16 bits, sobel, perspective",
-            {lit, "volume.bits=16", "shading.gradient=sobel", "camera.projection=perspective"});
-        add("pips, analytic, phong, two-sided", {lit, method("pips"), "shading.gradient=analytic",
-                                                 "shading.model=phong", "shading.two_sided=true"});
-        for (const char* rule : {"linear", "nlpi", "centroid", "two_point"})
-            for (const char* name : {"pi2d", "pips", "leg"})
-                add(fmt::format("{}, {}", name, rule),
-                    {lit, method(name), "classification.table_size=64", std::string("shading.inside=") + rule,
-                     "classification.order=" + std::string(name == std::string_view("leg") ? "3" : "1")});
-        add("pi2d, back to front",
-            {unlit, method("pi2d"), "classification.table_size=64", "compositing.form=back_to_front"});
-        for (const char* name : {"pc", "pips", "pi2d", "pi1d"}) {
-            add(std::string(name) + ", unlit", {unlit, method(name), "classification.table_size=64"});
-            add(std::string(name) + ", fine steps",
-                {unlit, method(name), "classification.table_size=64", "sampling.step=0.2"});
-        }
-        add("pi1d, opacities", {lit, method("pi1d"), "compositing.form=alpha", "sampling.step=0.6"});
-        add("squeeze", {unlit, method("pc_mid"), "precision.preset=squeeze"});
-        add("eight bits", {lit, "precision.preset=eight_bit"});
-        add("wide", {lit, "precision.preset=wide"});
-    }
-    return cases;
-}
-
 /// All kernels of a case on one SIMD target.
-class KernelChecker {
+class KernelChecker : KernelInputs {
   public:
-    using Integer = std::int64_t;
-
-    KernelChecker(const KernelCase& c, std::int64_t target, unsigned seed)
-        : c_(c), plan_(c.plan), random_(seed), kernels_(kernels_for(c.plan, c.ways, c.source, target)) {
-        *lit_ = {}, *far_ = {}, *light_ = {}, *samples_ = {};
-    }
+    KernelChecker(const KernelCase& c, std::int64_t target, unsigned seed) : KernelInputs(c, target, seed) {}
 
     std::vector<KernelCheck> checks() {
         using namespace squint::HWY_NAMESPACE;
@@ -254,18 +154,6 @@ class KernelChecker {
     }
 
   private:
-    using L3 = std::array<Integer, 3>;
-
-    Integer below(Integer end) {
-        return static_cast<Integer>(random_() % static_cast<std::uint64_t>(std::max<Integer>(end, 1)));
-    }
-    /// Within [0, most], often at an end.
-    Integer up_to(Integer most) {
-        const Integer kind = below(8);
-        return kind == 0 ? 0 : kind == 1 ? most : below(most + 1);
-    }
-    static Integer one(int fraction) { return Integer{1} << fraction; }
-    Integer full_length() const { return one(plan_.location.length_fraction); }
     static std::string differs(const char* what, int i, Integer expected, Integer found) {
         return expected == found
                    ? std::string()
@@ -277,151 +165,6 @@ class KernelChecker {
             if (std::string text = at(i); !text.empty()) return text;
         return {};
     }
-
-    // ------------------------------------------------------------------------------------ inputs
-
-    void draw_place() {
-        const int left = static_cast<int>(below(24)), top = static_cast<int>(below(24));
-        place_ = {left, top, 24, 24};
-    }
-    void draw_rays() {
-        do {
-            draw_place();
-            kernels_.set_up(plan_, place_, rays_);
-        } while (rays_.most_slabs == 0);
-        samples_->first = static_cast<Word>(below(rays_.most_slabs));
-    }
-    void draw_cells() {
-        for (int i = 0; i < kBatch; ++i)
-            for (std::size_t a = 0; a < 3; ++a)
-                samples_->cell[a].v[i] = static_cast<Word>(up_to(plan_.location.last_cell[a]));
-        draw_weights(samples_->weight, kBatch);
-    }
-    void draw_weights(Batch (&weight)[3], int count) {
-        for (Batch& w : weight)
-            for (int i = 0; i < count; ++i)
-                w.v[i] = static_cast<Word>(up_to(one(plan_.interpolation.weight_bits)));
-    }
-    void draw_corners() {
-        const Integer largest = plan_.volume->largest;
-        for (Batch& pair : samples_->pair)
-            for (Word& v : pair.v) v = static_cast<Word>(up_to(largest) | up_to(largest) << 16);
-    }
-    void draw_inputs() {
-        for (int i = 0; i < kBatch; ++i) {
-            samples_->input.v[i] = static_cast<Word>(up_to(plan_.input.highest));
-            samples_->length.v[i] = static_cast<Word>(below(3) == 0 ? up_to(full_length()) : full_length());
-        }
-        samples_->all_full = false;
-    }
-    // Colours and opacities of slabs as classification leaves them: within 0 to 1, premultiplied ones no greater
-    // than their opacity.
-    void draw_slab(Word& alpha, Word* color0, Word* color1, Word* color2) {
-        const CompositingStage& s = plan_.compositing;
-        const Integer a = below(4) == 0 ? 0 : up_to(one(s.alpha_fraction));
-        alpha = static_cast<Word>(a);
-        const int finer = s.color_fraction - s.alpha_fraction;
-        const Integer most = !s.premultiplied ? one(s.color_fraction) : finer >= 0 ? a << finer : a >> -finer;
-        for (Word* color : {color0, color1, color2}) *color = static_cast<Word>(up_to(most));
-    }
-    void draw_slabs() {
-        for (int i = 0; i < kBatch; ++i)
-            draw_slab(samples_->alpha.v[i], &samples_->color[0].v[i], &samples_->color[1].v[i],
-                      &samples_->color[2].v[i]);
-    }
-    void draw_pixels() {
-        const CompositingStage& s = plan_.compositing;
-        for (int r = 0; r < kRays; ++r) {
-            const Integer t = up_to(s.unit());
-            pixels_.transparency.v[r] = static_cast<Word>(t);
-            const Integer gathered = s.form == CompositingForm::alpha ? t : s.unit() - t;
-            for (Row& color : pixels_.color)
-                color.v[r] = static_cast<Word>(std::ldexp(static_cast<double>(up_to(gathered)),
-                                                          s.sum_fraction - s.transparency_fraction));
-            // A ray that goes on has not met its end yet.
-            const bool goes_on = s.form == CompositingForm::back_to_front ||
-                                 HWY_NAMESPACE::goes_on(s, Accumulated<Integer>{{0, 0, 0}, t});
-            pixels_.active.v[r] = goes_on && rays_.slabs.v[r] > samples_->first && below(4) > 0;
-            pixels_.samples.v[r] = static_cast<Word>(below(1000));
-        }
-        pixels_before_ = pixels_;
-    }
-    void draw_lit() {
-        draw_rays();
-        count_ = 1 + static_cast<int>(below(kSteps * kRays));
-        for (int i = 0; i < kBatch; ++i)
-            for (std::size_t a = 0; a < 3; ++a)
-                lit_->cell[a].v[i] = static_cast<Word>(up_to(plan_.location.last_cell[a]));
-        draw_weights(lit_->weight, kBatch);
-    }
-    void draw_known() {
-        for (Word& known : known_before_.v) known = static_cast<Word>(below(2));
-    }
-    void draw_ends() {
-        count_ = 1 + static_cast<int>(below(kSteps * kRays));
-        const Integer largest = std::min<Integer>(plan_.specs[Wire::gradient].format.largest(), 1 << 29);
-        for (int i = 0; i < kBatch; ++i) {
-            lit_->from.v[i] = static_cast<Word>(below(kSteps * kRays));
-            for (Batch& component : ends_.component)
-                component.v[i] = static_cast<Word>(up_to(2 * largest) - largest);
-        }
-    }
-    void draw_lit_slabs() {
-        const double length = std::ldexp(1.0, plan_.shading.normal_fraction);
-        const auto unit_vector = [&](Batch(&to)[3], int i, double size) {
-            Vec3 v(std::normal_distribution<>()(random_), std::normal_distribution<>()(random_),
-                   std::normal_distribution<>()(random_));
-            v *= size / std::max(v.length(), 1e-9);
-            for (int a = 0; a < 3; ++a) to[a].v[i] = static_cast<Word>(std::floor(v[a] + 0.5));
-        };
-        const double light = std::ldexp(1.0, plan_.shading.light_fraction);
-        for (int i = 0; i < kBatch; ++i) {
-            unit_vector(lit_->normal, i, below(8) == 0 ? 0 : length);
-            unit_vector(lit_->view, i, light);
-            for (auto& half : lit_->half) unit_vector(half, i, light);
-            draw_slab(lit_->alpha.v[i], &lit_->color[0].v[i], &lit_->color[1].v[i], &lit_->color[2].v[i]);
-        }
-        *lit_before_ = *lit_;
-    }
-
-    // Visible slabs as they were classified.
-    void draw_whole_slabs() {
-        draw_inputs();
-        kernels_.classify(plan_, kSteps, *samples_);
-        count_ = 0;
-        for (int i = 0; i < kSteps * kRays; ++i) {
-            if (samples_->alpha.v[i] == 0) continue;
-            for (int end = 0; end < 2; ++end) lit_->input[end].v[count_] = samples_->input.v[i + end * kRays];
-            lit_->length.v[count_] = samples_->length.v[i], lit_->alpha.v[count_] = samples_->alpha.v[i];
-            for (int c = 0; c < 3; ++c) lit_->color[c].v[count_] = samples_->color[c].v[i];
-            ++count_;
-        }
-    }
-    void draw_ways() {
-        for (int i = 0; i < kBatch; ++i) {
-            for (lanes::Batch& way : light_->way) way.v[i] = static_cast<Word>(up_to(one(kWayBits)));
-            light_->share.v[i] = static_cast<Word>(up_to(one(kShareBits)));
-        }
-    }
-    void draw_two_normals() {
-        draw_lit_slabs();
-        *far_ = *lit_;
-        draw_lit_slabs();
-    }
-    // Parts that sum to a slab at most.
-    void draw_parts() {
-        const Integer most = one(plan_.shading.color_fraction);
-        for (int i = 0; i < kBatch; ++i)
-            for (int c = 0; c < 4; ++c) {
-                Integer left = up_to(most);
-                for (auto& part : light_->part) {
-                    const Integer here = up_to(left);
-                    part[c].v[i] = static_cast<Word>(here), left -= here;
-                }
-            }
-    }
-
-    // ------------------------------------------------------------------------------- the model's lines
 
     static L3 three(const Batch (&from)[3], int i) { return {from[0].v[i], from[1].v[i], from[2].v[i]}; }
 
@@ -762,24 +505,6 @@ class KernelChecker {
             });
         });
     }
-
-    const KernelCase& c_;
-    const Plan& plan_;
-    std::mt19937_64 random_;
-    StageKernels kernels_;
-    PacketPlace place_{};
-    RayPacket rays_{};
-    PixelPacket pixels_{}, pixels_before_{};
-    Batch between_{};
-    std::unique_ptr<Samples> samples_ = std::make_unique<Samples>();
-    Samples before_{};
-    EndGradients ends_{};
-    Row known_before_{};
-    std::unique_ptr<LitSamples> lit_ = std::make_unique<LitSamples>(),
-                                lit_before_ = std::make_unique<LitSamples>(),
-                                far_ = std::make_unique<LitSamples>();
-    std::unique_ptr<SlabLight> light_ = std::make_unique<SlabLight>();
-    int count_ = 0;
 };
 
 }  // namespace squint::lanes
