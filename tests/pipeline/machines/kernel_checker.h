@@ -13,7 +13,6 @@
 #include <cstdint>
 #include <functional>
 #include <string>
-#include <string_view>
 #include <tuple>
 #include <variant>
 #include <vector>
@@ -38,10 +37,10 @@ class KernelChecker : KernelInputs {
         std::vector<KernelCheck> all;
         const int back = plan_.needs_back ? 1 : 0, rows = kSteps + back;
         const auto add = [&](const char* kernel, auto draw, auto run, auto difference) {
-            const bool lit = std::string_view(kernel) == "shade" ||
-                             std::string_view(kernel) == "fetch_lit, find_gradients and find_normals";
-            all.push_back(
-                {kernel, draw, run, difference, [this, lit] { return lit ? count_ : kSteps * kRays; }});
+            all.push_back({kernel, draw, run, difference, [] { return kSteps * kRays; }});
+        };
+        const auto add_lit = [&](const char* kernel, auto draw, auto run, auto difference) {
+            all.push_back({kernel, draw, run, difference, [this] { return count_; }});
         };
         add(
             "set_up", [this] { draw_place(); }, [this] { kernels_.set_up(plan_, place_, rays_); },
@@ -114,32 +113,32 @@ class KernelChecker : KernelInputs {
                     count_ = kernels_.gather_ends(plan_, rays_, kSteps, *samples_, ends_.known, *lit_);
                 },
                 [this] { return ends_difference(); });
-            add(
+            add_lit(
                 "add_ends", [this] { draw_ends(); },
                 [this] { kernels_.add_ends(plan_, count_, ends_, *lit_); },
                 [this] { return sum_difference(); });
         }
         if (looks_into_slabs(plan_.inside.rule) && plan_.inside.rule != InsideRule::adaptive) {
-            add(
+            add_lit(
                 "find_light", [this] { draw_whole_slabs(); },
                 [this] { kernels_.find_light(plan_, count_, *lit_, *light_); },
                 [this] { return light_difference(); });
-            add(
+            add_lit(
                 "lerp_ends", [this] { draw_ends(), draw_ways(); },
                 [this] { kernels_.lerp_ends(plan_, count_, ends_, lit_->from, *light_, *lit_, &*far_); },
                 [this] { return lerp_difference(); });
             if (lights_fade(plan_.inside.rule))
-                add(
+                add_lit(
                     "shade_fading", [this] { draw_lit(), draw_two_normals(), draw_parts(); },
                     [this] { kernels_.shade_fading(plan_, count_, *light_, *far_, *lit_); },
                     [this] { return fading_difference(); });
             else
-                add(
+                add_lit(
                     "join_places", [this] { draw_lit(), draw_two_normals(), draw_ways(); },
                     [this] { kernels_.join_places(plan_, count_, *light_, *far_, *lit_); },
                     [this] { return join_difference(); });
         }
-        add(
+        add_lit(
             "fetch_lit, find_gradients and find_normals", [this] { draw_lit(); },
             [this] {
                 kernels_.fetch_lit(plan_, c_.source, count_, *lit_);
@@ -147,7 +146,7 @@ class KernelChecker : KernelInputs {
                 kernels_.find_normals(plan_, count_, *lit_);
             },
             [this] { return normal_difference(); });
-        add(
+        add_lit(
             "shade", [this] { draw_lit(), draw_lit_slabs(); },
             [this] { kernels_.shade(plan_, count_, *lit_); }, [this] { return shade_difference(); });
         return all;
