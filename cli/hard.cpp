@@ -42,7 +42,6 @@ struct Case {
 std::vector<std::string> files_of(const std::vector<std::string>& names) {
     std::vector<std::string> scenes;
     for (const std::string& name : names) {
-        if (!fs::exists(name)) throw InputError(name + ": no such file or folder");
         if (!fs::is_directory(name)) {
             scenes.push_back(name);
             continue;

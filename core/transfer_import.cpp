@@ -2,6 +2,7 @@
 
 #include "core/color_spaces.h"
 #include "core/error.h"
+#include "core/read_whole.h"
 #include "core/srgb.h"
 #include "core/text.h"
 
@@ -12,7 +13,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstddef>
-#include <fstream>
 #include <iterator>
 #include <optional>
 #include <span>
@@ -28,17 +28,7 @@ constexpr std::size_t kMostPoints = 65536;
 }
 
 std::string read_text(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    if (!file) refuse(path, "cannot be opened");
-    std::string text;
-    for (char part[1 << 16]; text.size() <= kMostBytes && file;) {
-        file.read(part, sizeof part);
-        text.append(part, static_cast<std::size_t>(file.gcount()));
-    }
-    if (file.bad()) refuse(path, "cannot be read");
-    if (text.size() > kMostBytes)
-        refuse(path, fmt::format("larger than {} bytes, no transfer function is", kMostBytes));
-    return text;
+    return read_whole(path, "a transfer function of ParaView, 3D Slicer or ImageVis3D", kMostBytes);
 }
 
 Vec3 decoded(const Vec3& color, bool srgb) {

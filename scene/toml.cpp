@@ -1,20 +1,17 @@
 #include "scene/toml.h"
 
 #include "core/error.h"
+#include "core/read_whole.h"
 #include "core/text.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <cerrno>
 #include <cmath>
 #include <cstdlib>
-#include <fstream>
 #include <numeric>
 #include <sstream>
 #include <stdexcept>
-#include <system_error>
 #include <utility>
 
 namespace squint {
@@ -234,19 +231,11 @@ TomlValue parse_toml(std::string_view text, const std::string& name) {
     }
 }
 
+std::string read_toml_text(const std::string& path) {
+    return read_whole(path, "a text file in TOML", kLargestText);
+}
 TomlValue read_toml(const std::string& path) {
-    errno = 0;
-    std::ifstream file(path, std::ios::binary);
-    std::string text;
-    std::array<char, 1 << 16> piece;
-    while (file && text.size() <= kLargestText) {
-        file.read(piece.data(), piece.size());
-        text.append(piece.data(), static_cast<std::size_t>(file.gcount()));
-    }
-    if (!file.is_open() || file.bad())
-        throw InputError(fmt::format("{}: cannot be read: {}; allowed: a text file in TOML", path,
-                                     errno != 0 ? std::generic_category().message(errno) : "unknown reason"));
-    return parse_toml(text, path);
+    return parse_toml(read_toml_text(path), path);
 }
 
 std::string toml_text(double value) {

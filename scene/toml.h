@@ -28,7 +28,8 @@ struct TomlValue {
 /// characters. Throws InputError `name:line:column: ...`.
 TomlValue parse_toml(std::string_view text, const std::string& name);
 
-/// Reads a file of at most 16 MiB and parses it.  Throws InputError.
+/// Reads a file of at most 16 MiB, and parses it.  Throws InputError.
+std::string read_toml_text(const std::string& path);
 TomlValue read_toml(const std::string& path);
 
 /// A value as TOML, on one line and in ASCII; it reads back as the same value.

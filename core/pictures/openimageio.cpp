@@ -67,7 +67,7 @@ std::string encode(const Packed& picture, const std::string& path) {
     const auto output = OIIO::ImageOutput::create(picture.format);
     if (!output || !output->set_ioproxy(&encoded))
         throw InputError(
-            fmt::format("{}: cannot write, OpenImageIO has no writer for {}", path, picture.format));
+            fmt::format("{}: cannot write: OpenImageIO has no writer for {}", path, picture.format));
     // UNKNOWN: each channel keeps its type
     if (!output->open(path, spec) || !output->write_image(OIIO::TypeDesc::UNKNOWN, picture.data) ||
         !output->close())
@@ -77,11 +77,10 @@ std::string encode(const Packed& picture, const std::string& path) {
 }
 
 std::unique_ptr<OIIO::ImageInput> open(const std::string& path) {
-    std::error_code ignored;
-    if (!std::filesystem::exists(path, ignored))
-        throw InputError(path + ": cannot read, there is no such file");
-    if (std::filesystem::is_directory(path, ignored))
-        throw InputError(path + ": cannot read, it is a folder");
+    std::error_code why;
+    if (is_directory(std::filesystem::status(path, why)))
+        why = std::make_error_code(std::errc::is_a_directory);
+    if (why) throw InputError(fmt::format("{}: cannot read: {}", path, why.message()));
     const std::string format = format_of(path);
     if (format.empty())
         throw InputError(fmt::format(
@@ -90,7 +89,7 @@ std::unique_ptr<OIIO::ImageInput> open(const std::string& path) {
     auto input = OIIO::ImageInput::create(format);
     OIIO::ImageSpec spec;
     if (!input)
-        throw InputError(fmt::format("{}: cannot read, OpenImageIO has no reader for {}", path, format));
+        throw InputError(fmt::format("{}: cannot read: OpenImageIO has no reader for {}", path, format));
     if (!input->open(path, spec))
         throw InputError(fmt::format("{}: cannot read: {}", path, one_line(input->geterror())));
     return input;

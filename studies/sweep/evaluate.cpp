@@ -5,6 +5,7 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/module_file.h"
+#include "core/read_whole.h"
 #include "pipeline/audit_record.h"
 #include "pipeline/machines/lanes/empty_space.h"
 #include "pipeline/machines/model.h"
@@ -20,7 +21,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 #include <thread>
 
 namespace squint::sweep {
@@ -179,11 +179,8 @@ Spec edited(Spec spec, const WireEdit& edit) {
 
 Json program_record() {
     static const std::string hash = [] {
-        std::ifstream file(module_file(), std::ios::binary);
-        std::ostringstream bytes;
-        bytes << file.rdbuf();
         Hasher hasher;
-        hasher.text(bytes.str());
+        hasher.text(read_whole(module_file(), "squint's own program"));
         return hasher.hex();
     }();
     return {{"version", version()}, {"program", hash}};

@@ -3,6 +3,7 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/parallel.h"
+#include "core/read_whole.h"
 #include "pipeline/render.h"
 #include "scene/toml.h"
 #include "studies/sweep/run_folder.h"
@@ -12,11 +13,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <set>
 
@@ -244,11 +242,9 @@ Json value_of_label(const std::string& label) {
 }
 
 Json read_json(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    if (!file) throw InputError(fmt::format("{}: cannot read: {}", path, std::strerror(errno)));
-    const Json json = Json::parse(file, nullptr, false);
-    if (json.is_discarded())
-        throw InputError(fmt::format("{}: found no JSON; allowed: a file that squint wrote", path));
+    constexpr std::string_view kAllowed = "a file that squint wrote";
+    const Json json = Json::parse(read_whole(path, kAllowed), nullptr, false);
+    if (json.is_discarded()) throw InputError(fmt::format("{}: found no JSON; allowed: {}", path, kAllowed));
     return json;
 }
 

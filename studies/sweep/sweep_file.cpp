@@ -9,9 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <functional>
-#include <sstream>
 
 namespace squint::sweep {
 namespace {
@@ -462,11 +460,8 @@ SweepFile parse_sweep(std::string_view text, const std::string& name, const std:
 }
 
 SweepFile read_sweep(const std::string& path, const std::vector<std::string>& overrides) {
-    read_toml(path);  // throws where there is no such file or it is too large
-    std::ifstream file(path, std::ios::binary);
-    std::ostringstream text;
-    text << file.rdbuf();
-    return parse_sweep(text.str(), path, std::filesystem::path(path).parent_path().string(), overrides);
+    return parse_sweep(read_toml_text(path), path, std::filesystem::path(path).parent_path().string(),
+                       overrides);
 }
 
 std::string scene_path(const SweepFile& sweep, std::size_t i) {

@@ -253,8 +253,8 @@ TEST(SceneFile, RefusesBrokenTomlAtItsPlace) {
 }
 
 TEST(SceneFile, RefusesFilesThatCannotBeRead) {
-    EXPECT_THAT(message_of([] { read_scene("no/such.toml"); }), StartsWith("no/such.toml: cannot be read: "));
-    EXPECT_THAT(message_of([] { read_scene("."); }), StartsWith(".: cannot be read: "));
+    EXPECT_THAT(message_of([] { read_scene("no/such.toml"); }), StartsWith("no/such.toml: cannot read: "));
+    EXPECT_THAT(message_of([] { read_scene("."); }), StartsWith(".: cannot read: "));
 }
 
 // --- Overrides -----------------------------------------------------------------------------------
