@@ -325,8 +325,6 @@ int run_on_these_threads(const RenderArguments& a) {
     check_output(preview, "--preview", kPreviews);
     check_output(a.reference_output, "--reference-output", kExr);
     check_output(a.profile, "--profile", kPages);
-    if (!a.profile.empty())
-        if (const std::string why = sweep::why_no_page(); !why.empty()) throw InputError("--profile: " + why);
     if (a.json != "-") check_output(a.json, "--json", {});
     if (ends_in(output, kPreviews)) {
         if (!preview.empty())

@@ -3,7 +3,6 @@
 #include "cli/common.h"
 #include "cli/verb.h"
 #include "core/atomic_file.h"
-#include "core/error.h"
 
 #include <fmt/format.h>
 
@@ -23,8 +22,6 @@ struct ReportArguments {
 int run(const ReportArguments& a) {
     using namespace squint::sweep;
     const bool page = a.format == "html";
-    if (page)
-        if (const std::string why = why_no_page(); !why.empty()) throw InputError("report: " + why);
     const Json data = report_data(a.run, a.max_error);
     if (page) {
         const std::string path =

@@ -459,14 +459,7 @@ std::string report_markdown(const Json& data) {
     return text;
 }
 
-std::string why_no_page() {
-    return report_page().empty() ? "this build has no page for reports: tools/report/bundle makes "
-                                   "tools/report/report.html, which the build takes in"
-                                 : "";
-}
-
 std::string report_html(const Json& data, const std::string& run, std::int64_t most_picture_bytes) {
-    if (const std::string why = why_no_page(); !why.empty()) throw InputError("report: " + why);
     const std::set<std::size_t> front = pareto_front(data);
     Pictures pictures(most_picture_bytes);
     const Json& points = data["points"];

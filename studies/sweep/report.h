@@ -26,7 +26,4 @@ std::string report_markdown(const Json& data);
 /// full; the others in full or coarser, as room allows.  No `run`: no pictures.
 std::string report_html(const Json& data, const std::string& run, std::int64_t most_picture_bytes = 24 << 20);
 
-/// A line that says why this build has no page; empty where it has one.
-std::string why_no_page();
-
 }  // namespace squint::sweep

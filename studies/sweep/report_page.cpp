@@ -3,7 +3,6 @@
 #include <cstddef>
 
 // The assembler copies the file: as an array, a megabyte would take the compiler a minute.
-#ifdef SQUINT_REPORT_PAGE
 asm(".section .rodata\n"
     ".balign 16\n"
     "squint_report_page_begin:\n"
@@ -13,17 +12,12 @@ asm(".section .rodata\n"
     ".byte 0\n"
     ".previous\n");
 extern "C" const char squint_report_page_begin[], squint_report_page_end[];
-#endif
 
 namespace squint::sweep {
 
 std::string_view report_page() {
-#ifdef SQUINT_REPORT_PAGE
     return {squint_report_page_begin,
             static_cast<std::size_t>(squint_report_page_end - squint_report_page_begin)};
-#else
-    return {};
-#endif
 }
 
 }  // namespace squint::sweep

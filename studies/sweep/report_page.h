@@ -1,5 +1,4 @@
-// The page of a report, built into the program; empty where tools/report/report.html was
-// missing.
+// The page of a report, built into the program (tools/report).
 #pragma once
 
 #include <string_view>

@@ -93,11 +93,6 @@ test('a profile shows the wires of one picture, and nothing of sweeps', async ()
   }
 });
 
-test('the page is the one that its parts make', () => {
-  const parts = join(is.parts, 'page'), page = readFileSync(join(is.parts, 'report.html'), 'utf8');
-  for (const file of readdirSync(parts).filter((name) => /\.(js|css)$/.test(name))) assert.ok(page.includes(readFileSync(join(parts, file), 'utf8')), `${file} changed: run tools/report/bundle`);
-});
-
 test('the policy allows no other script or style, and no inline one', () => {
   const policy = /Content-Security-Policy" content="([^"]*)"/.exec(readFileSync(wires, 'utf8'))[1];
   assert.match(policy, /default-src 'none'/);

@@ -1,5 +1,4 @@
-// The page's parts (page/) and the libraries -> report.html.
-import { createHash } from 'node:crypto';
+// The packages of package.json -> libraries/: one script, one style, and their licences as the page shows them.
 import { existsSync, readFileSync, readdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 
@@ -50,33 +49,15 @@ function notices() {
 
 const escaped = (text) => text.replace(/&/g, '&amp;').replace(/</g, '&lt;').replace(/>/g, '&gt;');
 const plain = (script) => script.replace(/\/\/# sourceMappingURL=\S+/g, '').replace(/<\/script/g, '<\\/script').replace(/<!--/g, '<\\!--');
-const hash = (text) => `'sha256-${createHash('sha256').update(text, 'utf8').digest('base64')}'`;
 
 // A module as a script: what it imports is vega's, what it exports becomes vega's.
 const asScript = (module) => `(function () {\n${module
   .replace(/^import \{([^}]*)\} from 'vega-util';$/m, 'const {$1} = vega;')
   .replace(/^export \{([^}]*)\};$/m, (_, names) => names.split(',').map((name) => name.trim().split(' as ')).map(([own, name = own]) => `vega.${name} = ${own};`).join(' '))}\n})();\n`;
 
-const library = plain(libraries.map((path) => /^export \{/m.test(modules(path)) ? asScript(modules(path)) : modules(path)).join('\n'));
-// Each after what it calls when it is read; one scope, closed to the page.
-const kScripts = ['data', 'charts', 'pareto', 'sensitivity', 'heat', 'ranges', 'search', 'pictures', 'table', 'page'];
-const script = plain(`'use strict';\n(() => {\n${kScripts.map((name) => read(`page/${name}.js`)).join('\n')}})();\n`);
-const style = modules('img-comparison-slider/dist/styles.css') + read('page/page.css');
 const parts = {
-  '@POLICY@': [
-    "default-src 'none'",
-    `script-src ${hash(library)} ${hash(script)}`,
-    `style-src ${hash(style)}`,
-    "connect-src 'none'",
-    "base-uri 'none'",
-    "form-action 'none'",
-  ].join('; '),
-  '@STYLE@': style,
-  '@LIBRARY@': library,
-  '@SCRIPT@': script,
-  '@LICENCES@': escaped(notices()),
+  'libraries.js': plain(libraries.map((path) => /^export \{/m.test(modules(path)) ? asScript(modules(path)) : modules(path)).join('\n')),
+  'libraries.css': modules('img-comparison-slider/dist/styles.css'),
+  'licences.html': escaped(notices()),
 };
-let page = read('page/page.html');
-for (const [name, text] of Object.entries(parts)) page = page.replace(name, () => text);
-writeFileSync(join(here, 'report.html'), page);
-console.log(`report.html: ${Math.round(page.length / 1024)} KiB`);
+for (const [name, text] of Object.entries(parts)) writeFileSync(join(here, 'libraries', name), text);
