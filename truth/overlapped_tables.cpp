@@ -73,19 +73,9 @@ Moments OverlappedTables::whole_entries(int lo, int hi, bool ascending, int coun
 
 Moments OverlappedTables::moments(double front, double back, double length, int count) const {
     assert(front != back && (level.empty() || count <= static_cast<int>(level[0].moment.size())));
-    const double rate = length / (back - front);
-    const auto [i, u] = entry.place(front);
-    const auto [j, v] = entry.place(back);
-    if (i == j) return entry.inside_one_entry(i, u, v, rate, count);
-    const bool ascending = front < back;
-    Moments result = entry.inside_one_entry(i, u, ascending ? 1 : 0, rate, count);
-    Moments whole = ascending ? whole_entries(i + 1, j, true, count) : whole_entries(j + 1, i, false, count);
-    whole.depth *= std::abs(rate);
-    double factor = std::abs(rate);
-    for (int k = 0; k < count; ++k, factor *= std::abs(rate)) whole.q[k] *= factor;
-    result.append(whole, count);
-    result.append(entry.inside_one_entry(j, ascending ? 0 : 1, v, rate, count), count);
-    return result;
+    return entry.joined(front, back, length, count, [&](int lo, int hi, bool ascending) {
+        return whole_entries(lo, hi, ascending, count);
+    });
 }
 
 OverlappedTables build_overlapped_tables(const Entries& entries, int count, int mantissa_bits) {

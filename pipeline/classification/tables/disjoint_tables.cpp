@@ -31,12 +31,6 @@ Moments at(const DisjointTables::Level& level, int i, int count) {
     return result;
 }
 
-void scale(Moments& moments, double rate, int count) {
-    moments.depth *= rate;
-    double factor = rate;
-    for (int k = 0; k < count; ++k, factor *= rate) moments.q[k] *= factor;
-}
-
 /// Fills an entry's value from its neighbour nearer to the middle; `step` is the moment of entry i over the
 /// entry between them.
 struct LevelBuilder {
@@ -78,17 +72,9 @@ Moments DisjointTables::whole_entries(int lo, int hi, bool ascending, int count)
 
 Moments DisjointTables::moments(double front, double back, double length, int count) const {
     assert(front != back && count <= orders());
-    const double rate = length / (back - front);
-    const auto [i, u] = entry.place(front);
-    const auto [j, v] = entry.place(back);
-    if (i == j) return entry.inside_one_entry(i, u, v, rate, count);
-    const bool ascending = front < back;
-    Moments result = entry.inside_one_entry(i, u, ascending ? 1 : 0, rate, count);
-    Moments whole = ascending ? whole_entries(i + 1, j, true, count) : whole_entries(j + 1, i, false, count);
-    scale(whole, std::abs(rate), count);
-    result.append(whole, count);
-    result.append(entry.inside_one_entry(j, ascending ? 0 : 1, v, rate, count), count);
-    return result;
+    return entry.joined(front, back, length, count, [&](int lo, int hi, bool ascending) {
+        return whole_entries(lo, hi, ascending, count);
+    });
 }
 
 DisjointTables build_disjoint_tables(const Entries& entries, int count, Storage storage) {

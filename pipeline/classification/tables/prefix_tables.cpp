@@ -33,6 +33,12 @@ void Moments::append(const Moments& behind, int count) {
     depth += behind.depth;
 }
 
+void Moments::stretch(double rate, int count) {
+    depth *= rate;
+    double factor = rate;
+    for (int k = 0; k < count; ++k, factor *= rate) q[k] *= factor;
+}
+
 PrefixTables::Place PrefixTables::place(double s) const {
     if (size() == 1) return {0, 0};
     s = std::clamp(s, 0.0, static_cast<double>(size() - 1));

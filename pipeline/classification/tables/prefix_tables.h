@@ -8,6 +8,8 @@
 
 #include "pipeline/classification/tables/linear_entries.h"
 
+#include <cmath>
+
 namespace squint::preintegration {
 
 inline constexpr int kMostMoments = 5;
@@ -27,6 +29,8 @@ struct Moments {
 
     /// Appends the slab `behind`, `count` moments: sums of positive terms.
     void append(const Moments& behind, int count);
+    /// The same slab with its depths times `rate`.
+    void stretch(double rate, int count);
 };
 
 /// int c tau du over an entry along which both are linear: the step of X_1.
@@ -79,6 +83,23 @@ struct PrefixTables {
 
     /// Moments of the fractions u0 -> u1 of entry i at a signed rate: integrated, without prefixes.
     Moments inside_one_entry(int i, double u0, double u1, double rate, int count) const;
+
+    /// Moments of a slab, front != back: of the fractions of entries at its ends, and between them of
+    /// `whole(lo, hi, ascending)`, from entry lo to entry hi or back, at a rate of one.
+    template <class Whole>
+    Moments joined(double front, double back, double length, int count, const Whole& whole) const {
+        const double rate = length / (back - front);
+        const auto [i, u] = place(front);
+        const auto [j, v] = place(back);
+        if (i == j) return inside_one_entry(i, u, v, rate, count);
+        const bool ascending = front < back;
+        Moments result = inside_one_entry(i, u, ascending ? 1 : 0, rate, count);
+        Moments between = ascending ? whole(i + 1, j, true) : whole(j + 1, i, false);
+        between.stretch(std::abs(rate), count);
+        result.append(between, count);
+        result.append(inside_one_entry(j, ascending ? 0 : 1, v, rate, count), count);
+        return result;
+    }
 };
 
 /// `orders` is the number of X_k, 1 to kMostMoments; all arrays have entries.size() values.
