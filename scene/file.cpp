@@ -2,6 +2,7 @@
 #include "core/error.h"
 #include "scene/rules.h"
 #include "scene/scene.h"
+#include "scene/text.h"
 #include "scene/toml.h"
 
 #include <fmt/format.h>
@@ -85,7 +86,7 @@ class Reader {
         std::string_view elsewhere;         // the same name in another section
         for (const std::string_view known : keys_) {
             if (section.empty())
-                beside.insert(known.substr(0, known.find('.')));
+                beside.insert(section_of(known));
             else if (known.starts_with(section + '.'))
                 beside.insert(known.substr(section.size() + 1));
             if (elsewhere.empty() && known.ends_with('.' + name)) elsewhere = known;
@@ -309,7 +310,7 @@ class Reader {
             std::find(beside.begin(), beside.end(), key) != beside.end())
             return;
         auto& tf = scene_.transfer_function;
-        const std::string_view name = key.substr(key.find('.') + 1);
+        const std::string_view name = name_in_section(key);
         if (name != "points") tf.points.clear();
         if (name != "color" && name != "opacity") tf.color.clear(), tf.opacity.clear();
         if (name != "preset") tf.preset.clear();

@@ -8,13 +8,6 @@
 namespace squint {
 namespace {
 
-std::string_view section_of(std::string_view key) {
-    return key.substr(0, key.find('.'));
-}
-std::string_view name_in_section(std::string_view key) {
-    return key.substr(key.find('.') + 1);
-}
-
 constexpr std::string_view kLightsHelp =
     "[[lights]] tables, at most 8; \"headlight\" for one headlight; none: unlit";
 

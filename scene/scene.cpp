@@ -10,16 +10,6 @@
 #include <filesystem>
 
 namespace squint {
-namespace {
-
-std::string_view section_of(std::string_view key) {
-    return key.substr(0, key.find('.'));
-}
-std::string_view name_in_section(std::string_view key) {
-    return key.substr(key.find('.') + 1);
-}
-
-}  // namespace
 
 // --- Records -------------------------------------------------------------------------------------
 

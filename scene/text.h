@@ -55,6 +55,14 @@ inline std::string text_of(const Light& light) {
     return "{ " + text + " }";
 }
 
+/// The parts of "section.name".
+inline std::string_view section_of(std::string_view key) {
+    return key.substr(0, key.find('.'));
+}
+inline std::string_view name_in_section(std::string_view key) {
+    return key.substr(key.find('.') + 1);
+}
+
 template <class T>
 bool is_absent(const T&) {
     return false;
