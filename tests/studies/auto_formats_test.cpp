@@ -2,12 +2,12 @@
 #include "studies/search/auto_formats.h"
 #include "core/compare.h"
 #include "core/error.h"
-#include "core/volume_source.h"
 #include "pipeline/machines/certificate.h"
 #include "pipeline/machines/scene_bound.h"
 #include "pipeline/record.h"
 #include "pipeline/render.h"
 #include "scene/presets.h"
+#include "tests/plan_of.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ Chosen chosen(std::vector<std::string> overrides, int threads = 1) {
                      {"volume.dims=16", "image.width=12", "image.height=10", "camera.height=16",
                       "classification.method=pc", "lights=[]", "precision.preset=auto"});
     Chosen c{scene_with(built_in_scene(), overrides), {}, {}};
-    c.volume = std::make_shared<const Volume>(load_volume(volume_source(c.scene)));
+    c.volume = test::volume_of(c.scene);
     AutoSettings settings;
     settings.threads = threads;
     c.formats = choose_formats(c.scene, c.volume, settings);

@@ -1,10 +1,10 @@
 // squint search --guarantee pictures: what it writes is proven, and what it proves is written.
 #include "studies/search/by_certificate.h"
 #include "core/error.h"
-#include "core/volume_source.h"
 #include "pipeline/machines/certificate.h"
 #include "pipeline/machines/scene_bound.h"
 #include "tests/own_folder.h"
+#include "tests/plan_of.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -44,7 +44,7 @@ TEST_F(ByCertificate, WritesFormatsWhoseCertificatesHoldForEveryPicture) {
         overrides.push_back("precision.preset=\"" + r.formats_file + "\"");
         overrides.push_back("camera.turntable=2");
         const Scene scene = scene_with(built_in_scene(), overrides);
-        const auto volume = std::make_shared<const Volume>(load_volume(volume_source(scene)));
+        const auto volume = test::volume_of(scene);
         double worst = 0;
         for (int view = 0; view < 2; ++view)
             worst = std::max(worst, certify(make_plan(scene, volume, view)).most);
@@ -64,7 +64,7 @@ TEST_F(ByCertificate, WritesFormatsWhoseSceneBoundHoldsForEveryView) {
     std::vector<std::string> overrides = s.overrides;
     overrides.push_back("precision.preset=\"" + r.formats_file + "\"");
     const Scene scene = scene_with(built_in_scene(), overrides);
-    const auto volume = std::make_shared<const Volume>(load_volume(volume_source(scene)));
+    const auto volume = test::volume_of(scene);
     EXPECT_LE(bound_scene(make_plan(scene, volume)).most, r.found.bound);
 }
 

@@ -1,11 +1,11 @@
 // The tally against a count of its own: a word that knows no widths and counts what the stages do with it.
 #include "studies/sweep/cost.h"
 
-#include "core/volume_source.h"
 #include "pipeline/plan/any_slab-inl.h"
 #include "pipeline/render.h"
 #include "pipeline/stages/ray_setup-inl.h"
 #include "scene/scene.h"
+#include "tests/plan_of.h"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -232,7 +232,7 @@ struct VaryingVoxels {
 Plan plan_with(std::vector<std::string> settings) {
     settings.insert(settings.begin(), {"volume.dims=[16, 16, 16]", "classification.method=pc"});
     const Scene scene = scene_with(built_in_scene(), settings);
-    return make_plan(scene, std::make_shared<const Volume>(load_volume(volume_source(scene))));
+    return test::plan_of(scene);
 }
 
 const std::vector<std::vector<std::string>> kMethods{

@@ -1,8 +1,8 @@
 // The profile of a picture: what it says of each wire is what the formats that it names then do.
 #include "studies/sweep/profile.h"
-#include "core/volume_source.h"
 #include "pipeline/plan/plan.h"
 #include "pipeline/render.h"
+#include "tests/plan_of.h"
 
 #include <gtest/gtest.h>
 
@@ -44,7 +44,7 @@ int width_of(const Json& format) {
 TEST(Profile, FormatsThatAreEnoughKeepTheBudgetAndOverflowNowhere) {
     for (const char* method : {"pc", "pips"}) {
         Scene scene = small_scene(method);
-        const auto volume = std::make_shared<const Volume>(load_volume(volume_source(scene)));
+        const auto volume = test::volume_of(scene);
         const Profiled before = profile(scene, volume);
         int held = 0, enough = 0;
         for (const auto& [name, wire] : before.wires.items()) {
@@ -74,7 +74,7 @@ TEST(Profile, FormatsThatAreEnoughKeepTheBudgetAndOverflowNowhere) {
 // The page's first line counts the same bits, and says what no certificate is there for.
 TEST(Profile, TheFirstLineSaysWhatIsProvenAndWhatOverflows) {
     Scene scene = small_scene("pc");
-    const auto volume = std::make_shared<const Volume>(load_volume(volume_source(scene)));
+    const auto volume = test::volume_of(scene);
     scene.precision.override_[static_cast<std::size_t>(Wire::color)] = "u0.6";
     const Plan plan = make_plan(scene, volume);
     RenderOptions options;

@@ -1,11 +1,11 @@
 // What figures of the papers are made of: files that say how, light along a slab, gradients that turn.
 #include "core/error.h"
-#include "core/volume_source.h"
 #include "scene/scene.h"
 #include "studies/reproduce/angles.h"
 #include "studies/reproduce/figures.h"
 #include "studies/reproduce/slab_light.h"
 #include "tests/own_folder.h"
+#include "tests/plan_of.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -58,7 +58,7 @@ Image turns_of(const std::vector<std::string>& settings) {
                                  "lights=[]"};
     all.insert(all.end(), settings.begin(), settings.end());
     const Scene scene = scene_with(built_in_scene(), all);
-    const auto volume = std::make_shared<Volume>(load_volume(volume_source(scene)));
+    const auto volume = test::volume_of(scene);
     return gradient_turns(make_plan(scene, volume), 1);
 }
 

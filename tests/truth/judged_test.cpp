@@ -1,12 +1,12 @@
 // What an independent renderer in double found, each fault by its kind: right values that follow from a scene by
 // hand, for every member of the kind.
 #include "core/error.h"
-#include "core/volume_source.h"
 #include "pipeline/classification/tables/exact_slab.h"
 #include "pipeline/machines/model.h"
 #include "pipeline/plan/short_slabs.h"
 #include "pipeline/render.h"
 #include "pipeline/stages/presets.h"
+#include "tests/plan_of.h"
 #include "tests/truth/reference_cases.h"
 #include "truth/reference.h"
 #include "truth/slab_check.h"
@@ -214,7 +214,7 @@ TEST(Judged, HalfTheStepIsNoFurtherFromTheReferenceOnVolumesOfData) {
             read_scene(SQUINT_SOURCE_DIR "/configs/bench/" + std::string(name) + "_translucent.toml");
         scene = scene_with(scene, {"image.width=5", "image.height=5", "camera.turntable=1",
                                    "shading.model=none", "precision.preset=real", "sampling.termination=0"});
-        const auto volume = std::make_shared<const Volume>(load_volume(volume_source(scene)));
+        const auto volume = test::volume_of(scene);
         const Image reference = render_reference(make_plan(scene, volume));
         ASSERT_EQ(reference.width, kSize);
         for (const NamedMethod& method : every_method()) {

@@ -10,6 +10,7 @@
 #include "pipeline/record.h"
 #include "pipeline/render.h"
 #include "preintegration_cases.h"
+#include "tests/plan_of.h"
 
 #include <gtest/gtest.h>
 
@@ -224,7 +225,7 @@ TEST(ClassificationMethods, AnOrderThatIsNotGivenIsTheLeastOfItsMethod) {
             built_in_scene(),
             {"volume.dims=24", "camera.height=28", "sampling.step=4", "image.width=16", "image.height=16",
              "classification.method=" + method, "classification.order=" + order});
-        const auto volume = std::make_shared<const Volume>(load_volume(volume_source(scene)));
+        const auto volume = test::volume_of(scene);
         return picture_hash(render(make_plan(scene, volume)).image);
     };
     EXPECT_EQ(hash_of("leg", "auto"), hash_of("leg", "2"));

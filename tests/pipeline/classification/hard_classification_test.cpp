@@ -7,6 +7,7 @@
 #include "pipeline/render.h"
 #include "preintegration_cases.h"
 #include "scene/scene.h"
+#include "tests/plan_of.h"
 #include "truth/slab_check.h"
 
 #include <gtest/gtest.h>
@@ -411,7 +412,7 @@ void expect_half_an_lsb8(const std::string& name, Scene scene, int size, bool sa
     const std::string pixels = std::to_string(size);
     scene = scene_with(scene, {"image.width=" + pixels, "image.height=" + pixels,
                                "classification.table_size=256", "camera.turntable=1", "shading.model=none"});
-    const auto volume = std::make_shared<Volume>(load_volume(volume_source(scene)));
+    const auto volume = test::volume_of(scene);
     double most = 0;
     for (const NamedMethod& method : every_method()) {
         scene.classification.method = method.method, scene.classification.order = method.order;
@@ -505,7 +506,7 @@ TEST(HardClassification, NoMethodLeavesItsRangeOnAnyHardScene) {
         if (file.path().extension() != ".toml" || file.path().stem() == "million") continue;
         ++scenes;
         Scene scene = read_scene(file.path().string());
-        const auto volume = std::make_shared<Volume>(load_volume(volume_source(scene)));
+        const auto volume = test::volume_of(scene);
         for (const char* preset : {"default", "eight_bit"})
             for (const NamedMethod& method : every_method()) {
                 scene.precision.preset = preset;

@@ -1,7 +1,6 @@
 // Rules of the certificate that no picture shows alone: each holds for whatever the words may stand for,
 // and no longer does when it is halved.
 #include "core/portable_math.h"
-#include "core/volume_source.h"
 #include "pipeline/classification/tables/legendre.h"
 #include "pipeline/classification/tables/power_series.h"
 #include "pipeline/machines/certificate/methods.h"
@@ -9,6 +8,7 @@
 #include "pipeline/record.h"
 #include "pipeline/render.h"
 #include "tests/pipeline/machines/draw.h"
+#include "tests/plan_of.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ Plan plan_with(const std::vector<std::string>& more) {
                                       "classification.method=pips", "lights=[{headlight=true}]"};
     settings.insert(settings.end(), more.begin(), more.end());
     const Scene scene = scene_with(built_in_scene(), settings);
-    return make_plan(scene, std::make_shared<Volume>(load_volume(volume_source(scene))));
+    return test::plan_of(scene);
 }
 Bounded off_by(std::int64_t v, double error) {
     return with_error(v, Shares::one(0, error));

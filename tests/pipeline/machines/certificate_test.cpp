@@ -5,10 +5,10 @@
 #include "pipeline/machines/certificate.h"
 #include "core/error.h"
 #include "core/procedural.h"
-#include "core/volume_source.h"
 #include "pipeline/record.h"
 #include "pipeline/render.h"
 #include "tests/pipeline/machines/draw.h"
+#include "tests/plan_of.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -237,7 +237,7 @@ TEST(Certificate, KnowsThatColoursWhichNothingDimsPassTheCurves) {
 Plan plan_of(const std::string& file, std::vector<std::string> overrides) {
     overrides.insert(overrides.begin(), {"lights=[]", "classification.method=pc"});
     const Scene scene = read_scene(std::string(SQUINT_SOURCE_DIR) + "/configs/" + file, overrides);
-    return make_plan(scene, std::make_shared<const Volume>(load_volume(volume_source(scene))));
+    return test::plan_of(scene);
 }
 
 // What the first derivation missed (two of three; the third is PIPS's rows).  A ray's last slab, a part of a step long,
@@ -315,7 +315,7 @@ TEST(Certificate, OfKnownRoundingsIsTighterInFog) {
 TEST(Certificate, RefusesWhatItDoesNotBoundInOneLine) {
     const auto refusal = [](const std::vector<std::string>& overrides) -> std::string {
         const Scene scene = scene_with(built_in_scene(), overrides);
-        const Plan plan = make_plan(scene, std::make_shared<const Volume>(load_volume(volume_source(scene))));
+        const Plan plan = test::plan_of(scene);
         try {
             certify(plan);
         } catch (const InputError& error) {

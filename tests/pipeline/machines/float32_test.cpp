@@ -1,6 +1,6 @@
 // Preset `float32`: the same stages in float32 words, in lanes, and how near they come to `real`.
-#include "pipeline/record.h"
 #include "pipeline/render.h"
+#include "tests/plan_of.h"
 
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ Plan plan_with(const std::string& preset, std::vector<std::string> overrides) {
     overrides.insert(overrides.begin(), "classification.method=pc");
     overrides.push_back("precision.preset=" + preset);
     const Scene scene = scene_with(built_in_scene(), overrides);
-    return make_plan(scene, std::make_shared<Volume>(load_volume(volume_source(scene))));
+    return test::plan_of(scene);
 }
 
 double largest_difference(const Image& a, const Image& b) {

@@ -1,8 +1,8 @@
 // From frame to frame only what changed is made anew: each picture has the bits of one made from nothing.
-#include "core/volume_source.h"
 #include "pipeline/plan/kept_method.h"
 #include "pipeline/record.h"
 #include "pipeline/render.h"
+#include "tests/plan_of.h"
 
 #include <gtest/gtest.h>
 
@@ -27,7 +27,7 @@ Scene scene_of(const Settings& more) {
     return scene_with(built_in_scene(), all);
 }
 std::shared_ptr<const Volume> volume_of(const Scene& scene) {
-    return std::make_shared<const Volume>(load_volume(volume_source(scene)));
+    return test::volume_of(scene);
 }
 
 // Each differs from the one before it in what its line says.

@@ -1,10 +1,10 @@
 // Scenes whose kernels are checked alone: plans that choose among all of them.
 #pragma once
 
-#include "core/volume_source.h"
 #include "pipeline/machines/lanes/cell_blocks.h"
 #include "pipeline/machines/lanes/kernels.h"
 #include "scene/scene.h"
+#include "tests/plan_of.h"
 
 #include <fmt/format.h>
 
@@ -30,7 +30,7 @@ inline KernelCase kernel_case(const std::string& name, std::vector<std::string> 
          {"classification.method=pc", "volume.dims=[26, 23, 21]", "image.width=24", "image.height=24"})
         settings.insert(settings.begin(), common);
     const Scene scene = scene_with(built_in_scene(), settings);
-    const auto volume = std::make_shared<const Volume>(load_volume(volume_source(scene)));
+    const auto volume = test::volume_of(scene);
     KernelCase c{name + (in_cells ? ", cells" : ", linear"), make_plan(scene, volume), {}, nullptr, {}};
     c.ways = ways_of(c.plan);
     c.source.volume = c.plan.volume.get();

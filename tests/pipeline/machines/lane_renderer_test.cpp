@@ -1,6 +1,7 @@
 // The lanes' own ways through a picture against the plain ones: the same bits.
 #include "pipeline/record.h"
 #include "pipeline/render.h"
+#include "tests/plan_of.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,7 +18,7 @@ namespace {
 Rendering rendered(std::vector<std::string> overrides, const RenderOptions& options) {
     overrides.insert(overrides.begin(), "classification.method=pc");
     const Scene scene = scene_with(built_in_scene(), overrides);
-    return render(make_plan(scene, std::make_shared<Volume>(load_volume(volume_source(scene)))), options);
+    return render(test::plan_of(scene), options);
 }
 
 TEST(LaneRenderer, TakesTheSameBitsFromCellsWhateverRoomTheyHave) {

@@ -1,11 +1,11 @@
 // Cells of differences: when they are built, what they take, and the same bits with them and without.
 #include "pipeline/machines/lanes/lit_cells.h"
 
-#include "core/volume_source.h"
 #include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/record.h"
 #include "pipeline/render.h"
 #include "pipeline/stages/faces.h"
+#include "tests/plan_of.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ Scene scene_of(const Settings& more) {
     return scene_with(built_in_scene(), all);
 }
 std::shared_ptr<const Volume> volume_of(const Scene& scene) {
-    return std::make_shared<const Volume>(load_volume(volume_source(scene)));
+    return test::volume_of(scene);
 }
 /// Whether this machine has vectors: plain C++ takes gradients from voxels.
 bool has_vectors() {

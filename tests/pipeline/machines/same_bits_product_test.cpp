@@ -2,10 +2,10 @@
 // layout, with and without skipping empty space, each with each.  The random scenes of same_bits_test.cpp
 // meet these choices by chance, here all of them meet.
 #include "core/volume_data.h"
-#include "core/volume_source.h"
 #include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/record.h"
 #include "pipeline/render.h"
+#include "tests/plan_of.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -71,7 +71,7 @@ TEST(SameBits, ADozenScenesHaveTheModelsBitsByEveryCombinationOfTheWaysToDrawThe
             "output.fixed=true",        "output.samples=true", "classification.method=pc"};
         settings.insert(settings.end(), named.settings.begin(), named.settings.end());
         const Scene scene = scene_with(built_in_scene(), settings);
-        Plan plan = make_plan(scene, std::make_shared<const Volume>(load_volume(volume_source(scene))));
+        Plan plan = test::plan_of(scene);
         RenderOptions golden;
         golden.threads = 1, golden.path = Path::model;
         const Rendering model = render(plan, golden);

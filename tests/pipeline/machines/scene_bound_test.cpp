@@ -5,11 +5,11 @@
 #include "pipeline/machines/scene_bound.h"
 #include "core/error.h"
 #include "core/procedural.h"
-#include "core/volume_source.h"
 #include "pipeline/machines/certificate.h"
 #include "pipeline/record.h"
 #include "pipeline/render.h"
 #include "tests/pipeline/machines/draw.h"
+#include "tests/plan_of.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -224,7 +224,7 @@ TEST_P(SceneBoundOfCases, IsExceededByNoView) {
         const Scene scene =
             read_scene(file.path().string(), {"lights=[]", "classification.method=" + method,
                                               "image.width=24", "image.height=24", "camera.turntable=1"});
-        const auto volume = std::make_shared<const Volume>(load_volume(volume_source(scene)));
+        const auto volume = test::volume_of(scene);
         const Plan plan = make_plan(scene, volume);
         if (method == "pips" && plan.entries.any_opaque()) continue;
         const SceneBound bound = bound_with(plan, 1, 5000);
@@ -243,7 +243,7 @@ INSTANTIATE_TEST_SUITE_P(Hard, SceneBoundOfCases, ::testing::Values("pc", "pips"
 Plan built_in_plan(std::vector<std::string> overrides) {
     overrides.insert(overrides.begin(), {"lights=[]", "classification.method=pc", "volume.dims=32"});
     const Scene scene = scene_with(built_in_scene(), overrides);
-    return make_plan(scene, std::make_shared<const Volume>(load_volume(volume_source(scene))));
+    return test::plan_of(scene);
 }
 
 TEST(SceneBound, DependsOnNoThreads) {
@@ -268,7 +268,7 @@ TEST(SceneBound, FallsWithMoreBeams) {
 TEST(SceneBound, RefusesWhatItDoesNotBoundInOneLine) {
     const auto refusal = [](const std::vector<std::string>& overrides) -> std::string {
         const Scene scene = scene_with(built_in_scene(), overrides);
-        const Plan plan = make_plan(scene, std::make_shared<const Volume>(load_volume(volume_source(scene))));
+        const Plan plan = test::plan_of(scene);
         return what_has_no_scene_bound(plan).value_or("nothing was refused");
     };
     const std::string dark = "lights=[]", pc = "classification.method=pc", small = "volume.dims=8";
@@ -305,8 +305,7 @@ TEST(SceneBound, RefusesWhatItDoesNotBoundInOneLine) {
 TEST(SceneBound, OfWallsSaysThatItIsHopelessAndWhere) {
     const Scene scene = read_scene(SQUINT_SOURCE_DIR "/configs/hard/five_walls.toml",
                                    {"lights=[]", "classification.method=pc", "camera.turntable=1"});
-    const SceneBound bound = bound_with(
-        make_plan(scene, std::make_shared<const Volume>(load_volume(volume_source(scene)))), 2, 3000);
+    const SceneBound bound = bound_with(test::plan_of(scene), 2, 3000);
     EXPECT_GT(bound.most, kUseful);
     EXPECT_THAT(bound.hopeless, HasSubstr("nothing useful holds for every view"));
     EXPECT_THAT(bound.hopeless, HasSubstr("cells "));

@@ -1,13 +1,13 @@
 // How batches are cut: the order is the composition's, and a schedule says what it misses.
 #include "pipeline/machines/lanes/schedule.h"
 
-#include "core/volume_source.h"
 #include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/machines/lanes/lane_renderer.h"
 #include "pipeline/render.h"
 #include "pipeline/slab-inl.h"
 #include "pipeline/stages/ray_setup-inl.h"
 #include "scene/scene.h"
+#include "tests/plan_of.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ Plan plan_with(std::vector<std::string> settings) {
          {"volume.dims=16", "image.width=64", "image.height=64", "classification.method=pc"})
         settings.insert(settings.begin(), common);
     const Scene scene = scene_with(built_in_scene(), settings);
-    return make_plan(scene, std::make_shared<const Volume>(load_volume(volume_source(scene))));
+    return test::plan_of(scene);
 }
 
 Schedule schedule_with(const std::vector<std::string>& settings, bool in_cells = true) {

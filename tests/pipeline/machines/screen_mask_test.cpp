@@ -2,9 +2,9 @@
 // picture left out.  Pictures of R G B A alone, for all other channels are cast.
 #include "pipeline/machines/lanes/screen_mask.h"
 
-#include "core/volume_source.h"
 #include "pipeline/machines/lanes/kernels.h"
 #include "pipeline/render.h"
+#include "tests/plan_of.h"
 
 #include <gtest/gtest.h>
 
@@ -26,7 +26,7 @@ Plan plan_of(std::vector<std::string> settings, const std::vector<std::string>& 
     settings.insert(settings.begin(), "classification.method=pc");
     settings.insert(settings.end(), more.begin(), more.end());
     const Scene scene = scene_with(built_in_scene(), settings);
-    return make_plan(scene, std::make_shared<const Volume>(load_volume(volume_source(scene))));
+    return test::plan_of(scene);
 }
 
 const std::vector<std::vector<std::string>>& views() {

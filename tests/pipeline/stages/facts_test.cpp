@@ -5,6 +5,7 @@
 #include "pipeline/plan/plan.h"
 #include "pipeline/stages/default_facts.h"
 #include "scene/scene.h"
+#include "tests/plan_of.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -112,7 +113,7 @@ Plan plan_with(std::vector<std::string> settings) {
     settings.insert(settings.end(),
                     {"volume.dims=16", "image.width=64", "image.height=64", "classification.method=pc"});
     const Scene scene = scene_with(built_in_scene(), settings);
-    return make_plan(scene, std::make_shared<Volume>(load_volume(volume_source(scene))));
+    return test::plan_of(scene);
 }
 
 TEST(Facts, TheDefaultsHoldOfTheBuiltInScene) {

@@ -2,8 +2,9 @@
 // normals (docs/papers/guetat.md).  The exact values are those of even matter, x = int tau.
 #include "core/error.h"
 #include "pipeline/classification/tables/fade_table.h"
-#include "pipeline/record.h"
 #include "pipeline/slab-inl.h"
+#include "tests/pipeline/stages/word_of.h"
+#include "tests/plan_of.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -21,6 +22,7 @@ namespace {
 
 using namespace HWY_NAMESPACE;
 using preintegration::FadeMoments;
+using test::word_of;
 using Word = std::int64_t;
 
 Entries even_matter(double x) {
@@ -109,16 +111,8 @@ Plan plan_of(const std::string& rule, double x, const std::string& preset,
         fmt::format("transfer_function.points=[[0,1,1,1,{0:.17g}],[4095,1,1,1,{0:.17g}]]", -std::expm1(-x))};
     settings.insert(settings.end(), more.begin(), more.end());
     const Scene scene = scene_with(built_in_scene(), settings);
-    return make_plan(scene, std::make_shared<Volume>(load_volume(volume_source(scene))));
+    return test::plan_of(scene);
 }
-template <class W>
-W word(double value) {
-    if constexpr (std::same_as<W, Word>)
-        return static_cast<Word>(std::floor(value + 0.5));
-    else
-        return W{value};
-}
-
 template <class W, class M>
 FadingLight<W> fades_of(const Plan& plan, const M& method, W front, W back, W length, const Slab<W>& slab) {
     if constexpr (requires { method.fades; })
@@ -132,8 +126,8 @@ FadingLight<W> fades_of(const Plan& plan, const M& method, W front, W back, W le
 template <class W, class M = PreIntegrated2D>
 double lit(const Plan& plan, double degrees) {
     const auto& method = std::get<M>(plan.method);
-    const W front = word<W>(0), back = word<W>(static_cast<double>(plan.input.highest)),
-            full = word<W>(std::ldexp(1.0, plan.location.length_fraction));
+    const W front = word_of<W>(0), back = word_of<W>(static_cast<double>(plan.input.highest)),
+            full = word_of<W>(std::ldexp(1.0, plan.location.length_fraction));
     Slab<W> slab = classify(method, front, back, full);
     const FadingLight<W> light = fades_of(plan, method, front, back, full, slab);
     const double angle = degrees * std::numbers::pi / 180,
@@ -143,10 +137,10 @@ double lit(const Plan& plan, double degrees) {
     const Vec3 across = towards.cross(Vec3(0.3, 0.9, 0.1)).normalized();
     const Vec3 turned = towards * std::cos(angle) + across * std::sin(angle);
     const auto as_word = [&](const Vec3& v) {
-        return std::array<W, 3>{word<W>(v[0] * one), word<W>(v[1] * one), word<W>(v[2] * one)};
+        return std::array<W, 3>{word_of<W>(v[0] * one), word_of<W>(v[1] * one), word_of<W>(v[2] * one)};
     };
-    shade_fading(plan.shading, RayWords<W>{}, {as_word(towards), as_word(turned)}, {word<W>(0), word<W>(0)},
-                 light, slab.color);
+    shade_fading(plan.shading, RayWords<W>{}, {as_word(towards), as_word(turned)},
+                 {word_of<W>(0), word_of<W>(0)}, light, slab.color);
     const double color = to_double(slab.color[1]) / std::ldexp(1.0, plan.shading.color_fraction);
     return M::kPremultiplied
                ? color

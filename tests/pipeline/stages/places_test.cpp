@@ -1,8 +1,9 @@
 // Where along a slab its light comes from (shading.inside centroid and two_point), and what two gradients make of it.
 // The exact values are those of even matter, x = int tau, white, between gradients of lengths 1 and q that turn by an
 // angle from the light.
-#include "pipeline/record.h"
 #include "pipeline/slab-inl.h"
+#include "tests/pipeline/stages/word_of.h"
+#include "tests/plan_of.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -17,6 +18,7 @@ namespace squint {
 namespace {
 
 using namespace HWY_NAMESPACE;
+using test::word_of;
 using Word = std::int64_t;
 using Exact = Real<double>;
 
@@ -41,17 +43,10 @@ Plan plan_of(const std::string& rule, const std::string& points, const std::stri
                                       "transfer_function.points=" + points};
     settings.insert(settings.end(), more.begin(), more.end());
     const Scene scene = scene_with(built_in_scene(), settings);
-    return make_plan(scene, std::make_shared<Volume>(load_volume(volume_source(scene))));
+    return test::plan_of(scene);
 }
 std::string even(double x) {
     return fmt::format("[[0,1,1,1,{0:.17g}],[255,1,1,1,{0:.17g}]]", -std::expm1(-x));
-}
-template <class W>
-W word(double value) {
-    if constexpr (std::same_as<W, Word>)
-        return static_cast<Word>(std::floor(value + 0.5));
-    else
-        return W{value};
 }
 const PrefixLookup& prefix_of(const Plan& plan) {
     return std::get<PowerSeriesOfOrder1>(plan.method).prefix;
@@ -60,8 +55,8 @@ const PrefixLookup& prefix_of(const Plan& plan) {
 template <class W>
 LightPlaces<W> places(const Plan& plan, double front, double back) {
     const double entry = std::ldexp(1.0, plan.specs[Wire::classification_input].format.fraction_bits);
-    return places_of_light(plan.inside, prefix_of(plan), word<W>(front * entry), word<W>(back * entry),
-                           word<W>(std::ldexp(1.0, plan.location.length_fraction)));
+    return places_of_light(plan.inside, prefix_of(plan), word_of<W>(front * entry), word_of<W>(back * entry),
+                           word_of<W>(std::ldexp(1.0, plan.location.length_fraction)));
 }
 template <class W>
 double way(W place) {
@@ -157,15 +152,15 @@ double lit(const Plan& plan, double degrees, double ratio, bool highlight = fals
     const Vec3 towards = -plan.camera.view, across = towards.cross(Vec3(0.3, 0.9, 0.1)).normalized();
     const Vec3 turned = (towards * std::cos(angle) + across * std::sin(angle)) * ratio;
     const auto gradient = [&](const Vec3& normal) {
-        return std::array<W, 3>{word<W>(-normal[0] * length), word<W>(-normal[1] * length),
-                                word<W>(-normal[2] * length)};
+        return std::array<W, 3>{word_of<W>(-normal[0] * length), word_of<W>(-normal[1] * length),
+                                word_of<W>(-normal[2] * length)};
     };
-    const Slab<W> slab = classify(std::get<PowerSeriesOfOrder1>(plan.method), word<W>(0),
-                                  word<W>(static_cast<double>(plan.input.highest)),
-                                  word<W>(std::ldexp(1.0, plan.location.length_fraction)));
+    const Slab<W> slab = classify(std::get<PowerSeriesOfOrder1>(plan.method), word_of<W>(0),
+                                  word_of<W>(static_cast<double>(plan.input.highest)),
+                                  word_of<W>(std::ldexp(1.0, plan.location.length_fraction)));
     const auto light = [&](W place) {
         std::array<W, 3> color = slab.color;
-        if (highlight) color.fill(word<W>(0));
+        if (highlight) color.fill(word_of<W>(0));
         shade(
             plan.shading, RayWords<W>{},
             normalise(plan.gradient, gradient_up_to(plan.inside, gradient(towards), gradient(turned), place)),

@@ -2,6 +2,7 @@
 #include "pipeline/stages/presets.h"
 
 #include "pipeline/render.h"
+#include "tests/plan_of.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -114,7 +115,7 @@ TEST(Presets, DefaultKeepsSixtyDecibelsOfFogAtEveryStep) {
                          "camera.azimuth=0", "camera.elevation=0", "camera.height=0.1", "image.width=1",
                          "image.height=1", "shading.model=none", fmt::format("sampling.step={}", step),
                          fmt::format("classification.method={}", method), "precision.preset=" + preset});
-                    const auto volume = std::make_shared<Volume>(load_volume(volume_source(scene)));
+                    const auto volume = test::volume_of(scene);
                     RenderOptions options;
                     options.threads = 1;
                     const Image image = render(make_plan(scene, volume), options).image;

@@ -5,6 +5,7 @@
 
 #include "core/portable_math.h"
 #include "fixedpoint/words.h"
+#include "tests/plan_of.h"
 
 #include <gtest/gtest.h>
 
@@ -192,7 +193,7 @@ TEST(Shading, TheParabolaIsItsFormula) {
 TEST(Shading, TheParabolaKeepsTheFractionOfItsExponent) {
     const Scene scene = scene_with(built_in_scene(), {"volume.procedural=sphere", "volume.dims=8",
                                                       "shading.power=parabola", "shading.exponent=32.5"});
-    const Plan plan = make_plan(scene, std::make_shared<Volume>(load_volume(volume_source(scene))));
+    const Plan plan = test::plan_of(scene);
     const Word one = Word{1} << plan.shading.power_fraction;
     for (const Word below : {Word{1}, Word{64}, one / 64, one / 20})
         EXPECT_EQ(power(plan.shading, one - below),
