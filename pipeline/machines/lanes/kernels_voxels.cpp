@@ -101,32 +101,15 @@ void fetch_cells(const VoxelSource& source, int from, int to, Samples& s) {
 
 // ------------------------------------------------------------------------------------- empty space
 
-/// Bit i of the result: whether something may be visible around a beam at row `at[i]`, i < kWindow.
-template <class At>
-std::uint32_t seen_about(const lanes::EmptySpace& empty, const lanes::RayCourse& course, int enough,
-                         At&& at) {
-    const hn::ScalableTag<float> df;
+/// Bit i of the result: whether `seen_by(row, beam)`, a mask, holds of any beam at row `at[i]`, i < kWindow.
+template <class At, class SeenBy>
+HWY_INLINE std::uint32_t rows_seen(const lanes::RayCourse& course, const At& at, const SeenBy& seen_by) {
     const hn::ScalableTag<Word> d;
-    const Index3& corners = empty.corners;
     std::uint32_t seen = 0;
     for (int lane = 0; lane < lanes::RayCourse::kWindow; lane += kLanes) {
         const auto row = at(lane);
         auto here = hn::Gt(hn::Zero(d), hn::Zero(d));
-        for (int beam = 0; beam < course.beams; ++beam) {
-            auto index = hn::Zero(d);
-            for (int a = 2; a >= 0; --a) {
-                const auto p =
-                    hn::MulAdd(row, hn::Set(df, course.step[beam][a]), hn::Set(df, course.first[beam][a]));
-                const auto inside =
-                    hn::Min(hn::Max(p, hn::Zero(df)), hn::Set(df, static_cast<float>(corners[a] - 1)));
-                index = hn::Add(hn::Mul(index, hn::Set(d, static_cast<Word>(corners[a]))),
-                                hn::NearestInt(inside));
-            }
-            const auto clear =
-                hn::And(hn::GatherOffset(d, reinterpret_cast<const Word*>(empty.clear.data()), index),
-                        hn::Set(d, 0xff));
-            here = hn::Or(here, hn::Lt(clear, hn::Set(d, enough)));
-        }
+        for (int beam = 0; beam < course.beams; ++beam) here = hn::Or(here, seen_by(row, beam));
         std::uint8_t bits[8] = {};
         hn::StoreMaskBits(d, here, bits);
         seen |= static_cast<std::uint32_t>(bits[0] | bits[1] << 8) << lane;
@@ -134,76 +117,80 @@ std::uint32_t seen_about(const lanes::EmptySpace& empty, const lanes::RayCourse&
     return seen;
 }
 
-/// The same of the blocks alone that samples of row `at[i]` may lie in: at most two along each axis.
+/// Whether something may be visible around a beam at a row.
 template <class At>
-std::uint32_t seen_within(const lanes::EmptySpace& empty, const lanes::RayCourse& course, At&& at) {
+std::uint32_t seen_about(const lanes::EmptySpace& empty, const lanes::RayCourse& course, int enough,
+                         const At& at) {
+    const hn::ScalableTag<float> df;
+    const hn::ScalableTag<Word> d;
+    const Index3& corners = empty.corners;
+    return rows_seen(course, at, [&](auto row, int beam) HWY_ATTR {
+        auto index = hn::Zero(d);
+        for (int a = 2; a >= 0; --a) {
+            const auto p =
+                hn::MulAdd(row, hn::Set(df, course.step[beam][a]), hn::Set(df, course.first[beam][a]));
+            const auto inside =
+                hn::Min(hn::Max(p, hn::Zero(df)), hn::Set(df, static_cast<float>(corners[a] - 1)));
+            index =
+                hn::Add(hn::Mul(index, hn::Set(d, static_cast<Word>(corners[a]))), hn::NearestInt(inside));
+        }
+        const auto clear = hn::And(
+            hn::GatherOffset(d, reinterpret_cast<const Word*>(empty.clear.data()), index), hn::Set(d, 0xff));
+        return hn::Lt(clear, hn::Set(d, enough));
+    });
+}
+
+/// The same of the blocks alone that a row's samples may lie in: at most two along each axis.
+template <class At>
+std::uint32_t seen_within(const lanes::EmptySpace& empty, const lanes::RayCourse& course, const At& at) {
     const hn::ScalableTag<float> df;
     const hn::ScalableTag<Word> d;
     const Index3& blocks = empty.box.blocks;
     const auto apart = hn::Set(df, course.apart);
-    std::uint32_t seen = 0;
-    for (int lane = 0; lane < lanes::RayCourse::kWindow; lane += kLanes) {
-        const auto row = at(lane);
-        auto here = hn::Gt(hn::Zero(d), hn::Zero(d));
-        for (int beam = 0; beam < course.beams; ++beam) {
-            auto index = hn::Zero(d), span = hn::Set(d, 1);  // span: its bit of EmptySpace::spans
-            const auto along = [&](int a, auto further) HWY_ATTR {
-                const auto p =
-                    hn::MulAdd(row, hn::Set(df, course.step[beam][a]), hn::Set(df, course.first[beam][a]));
-                const auto most = hn::Set(df, static_cast<float>(blocks[a] - 1));
-                const auto block_at = [&](auto place) HWY_ATTR {  // floors, for no place is below zero
-                    return hn::ConvertTo(d, hn::Min(hn::Max(place, hn::Zero(df)), most));
-                };
-                const auto first = block_at(hn::Sub(p, apart)), last = block_at(hn::Add(p, apart));
-                index = hn::Add(hn::Mul(index, hn::Set(d, static_cast<Word>(blocks[a]))), first);
-                span = hn::IfThenElse(hn::Gt(last, first), further(span), span);
+    return rows_seen(course, at, [&](auto row, int beam) HWY_ATTR {
+        auto index = hn::Zero(d), span = hn::Set(d, 1);  // span: its bit of EmptySpace::spans
+        const auto along = [&](int a, auto further) HWY_ATTR {
+            const auto p =
+                hn::MulAdd(row, hn::Set(df, course.step[beam][a]), hn::Set(df, course.first[beam][a]));
+            const auto most = hn::Set(df, static_cast<float>(blocks[a] - 1));
+            const auto block_at = [&](auto place) HWY_ATTR {  // floors, for no place is below zero
+                return hn::ConvertTo(d, hn::Min(hn::Max(place, hn::Zero(df)), most));
             };
-            along(2, [](auto v) HWY_ATTR { return hn::ShiftLeft<4>(v); });
-            along(1, [](auto v) HWY_ATTR { return hn::ShiftLeft<2>(v); });
-            along(0, [](auto v) HWY_ATTR { return hn::ShiftLeft<1>(v); });
-            const auto spans = hn::GatherOffset(d, reinterpret_cast<const Word*>(empty.spans.data()), index);
-            here = hn::Or(here, hn::TestBit(spans, span));
-        }
-        std::uint8_t bits[8] = {};
-        hn::StoreMaskBits(d, here, bits);
-        seen |= static_cast<std::uint32_t>(bits[0] | bits[1] << 8) << lane;
-    }
-    return seen;
+            const auto first = block_at(hn::Sub(p, apart)), last = block_at(hn::Add(p, apart));
+            index = hn::Add(hn::Mul(index, hn::Set(d, static_cast<Word>(blocks[a]))), first);
+            span = hn::IfThenElse(hn::Gt(last, first), further(span), span);
+        };
+        along(2, [](auto v) HWY_ATTR { return hn::ShiftLeft<4>(v); });
+        along(1, [](auto v) HWY_ATTR { return hn::ShiftLeft<2>(v); });
+        along(0, [](auto v) HWY_ATTR { return hn::ShiftLeft<1>(v); });
+        const auto spans = hn::GatherOffset(d, reinterpret_cast<const Word*>(empty.spans.data()), index);
+        return hn::TestBit(spans, span);
+    });
 }
 
 /// The same of blocks of half a side, for rows whose samples lie in at most two of them along each axis.
 template <class At>
-std::uint32_t seen_in_fine(const lanes::EmptySpace& empty, const lanes::RayCourse& course, At&& at) {
+std::uint32_t seen_in_fine(const lanes::EmptySpace& empty, const lanes::RayCourse& course, const At& at) {
     const hn::ScalableTag<float> df;
     const hn::ScalableTag<Word> d;
     const Index3& blocks = empty.box.blocks;
     const auto apart = hn::Set(df, 2 * course.apart);
     const auto one = hn::Set(d, 1);
-    std::uint32_t seen = 0;
-    for (int lane = 0; lane < lanes::RayCourse::kWindow; lane += kLanes) {
-        const auto row = at(lane);
-        auto here = hn::Zero(d);
-        for (int beam = 0; beam < course.beams; ++beam) {
-            auto index = hn::Zero(d);
-            for (int a = 2; a >= 0; --a) {
-                const auto p = hn::MulAdd(row, hn::Set(df, 2 * course.step[beam][a]),
-                                          hn::Set(df, 2 * course.first[beam][a]));
-                const auto inside = hn::Min(hn::Max(hn::Sub(p, apart), hn::Zero(df)),
-                                            hn::Set(df, static_cast<float>(2 * blocks[a] - 1)));
-                // Floors, for no place is below zero.
-                index = hn::Add(hn::Mul(index, hn::Set(d, static_cast<Word>(2 * blocks[a]))),
-                                hn::ConvertTo(d, inside));
-            }
-            const auto bits = hn::GatherIndex(d, reinterpret_cast<const Word*>(empty.fine.data()),
-                                              hn::ShiftRight<5>(index));
-            const auto bit = hn::Shl(one, hn::And(index, hn::Set(d, 31)));
-            here = hn::Or(here, hn::And(bits, bit));
+    return rows_seen(course, at, [&](auto row, int beam) HWY_ATTR {
+        auto index = hn::Zero(d);
+        for (int a = 2; a >= 0; --a) {
+            const auto p = hn::MulAdd(row, hn::Set(df, 2 * course.step[beam][a]),
+                                      hn::Set(df, 2 * course.first[beam][a]));
+            const auto inside = hn::Min(hn::Max(hn::Sub(p, apart), hn::Zero(df)),
+                                        hn::Set(df, static_cast<float>(2 * blocks[a] - 1)));
+            // Floors, for no place is below zero.
+            index = hn::Add(hn::Mul(index, hn::Set(d, static_cast<Word>(2 * blocks[a]))),
+                            hn::ConvertTo(d, inside));
         }
-        std::uint8_t bits[8] = {};
-        hn::StoreMaskBits(d, hn::Ne(here, hn::Zero(d)), bits);
-        seen |= static_cast<std::uint32_t>(bits[0] | bits[1] << 8) << lane;
-    }
-    return seen;
+        const auto bits =
+            hn::GatherIndex(d, reinterpret_cast<const Word*>(empty.fine.data()), hn::ShiftRight<5>(index));
+        return hn::TestBit(bits, hn::Shl(one, hn::And(index, hn::Set(d, 31))));
+    });
 }
 
 lanes::Rows visible_rows_of(const lanes::EmptySpace& empty, const lanes::RayPacket& rays, int k,
