@@ -4,7 +4,6 @@
 
 #include <teem/nrrd.h>
 
-#include <cmath>
 #include <limits>
 
 /// teem keeps a few dozen bytes of some headers that it refuses; what it does with ours is measured here, not
