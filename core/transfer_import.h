@@ -1,18 +1,11 @@
-// Imports transfer functions of other programs; has presets for CT in HU.
+// Imports transfer functions of other programs.
 #pragma once
 
 #include "core/transfer_function.h"
 
 #include <string>
-#include <string_view>
-#include <vector>
 
 namespace squint {
-
-/// ct_bone, ct_skin, ct_muscle, ct_lung, ct_vessels, ... in HU.  Their unit_distance is 1 mm, so spacings
-/// must be in millimetres.
-std::vector<std::string> transfer_preset_names();
-bool find_transfer_preset(std::string_view name, TransferFunction& function);
 
 /// ParaView's JSON colour map: an object, or a list of which `map` names one (empty: the only one), with
 ///

@@ -2,6 +2,7 @@
 #include "core/error.h"
 #include "core/srgb.h"
 #include "core/transfer_import.h"
+#include "core/transfer_presets.h"
 #include "scene/from_data.h"
 #include "scene/scene.h"
 #include "scene/toml.h"
