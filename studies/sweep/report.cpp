@@ -1,35 +1,24 @@
+// What a report tells of a run: its points, its answer, and what was not measured.
 #include "studies/sweep/report.h"
 
 #include "core/error.h"
 #include "pipeline/record.h"
 #include "studies/sweep/answer.h"
-#include "studies/sweep/report_page.h"
 #include "studies/sweep/run.h"
 #include "studies/sweep/run_folder.h"
 
 #include <fmt/format.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <set>
-#include <sstream>
 
 namespace squint::sweep {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string bytes_of(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    std::ostringstream bytes;
-    bytes << file.rdbuf();
-    return bytes.str();
-}
 
 std::string quoted(const std::string& word) {  // quotes for a shell
     std::string text = "'";
@@ -60,30 +49,6 @@ Json error_of(const Json& figures) {
     return json;
 }
 
-// Costs of a point, by the names in its record.
-constexpr std::array kCostNames{"bits",
-                                "word_bits",
-                                "multiplier_bits",
-                                "divider_bits",
-                                "rounding_bits",
-                                "constant_multiplier_bits",
-                                "lookups",
-                                "lookup_bits",
-                                "mean_bits",
-                                "mean_multiplier_bits",
-                                "mean_divider_bits",
-                                "mean_rounding_bits",
-                                "mean_constant_multiplier_bits",
-                                "mean_lookups",
-                                "mean_lookup_bits",
-                                "table_bits",
-                                "table_bytes",
-                                "pixel_bits",
-                                "buffer_bytes",
-                                "voxel_bytes_per_sample",
-                                "voxel_bytes_per_lit_sample",
-                                "entry_bytes_per_sample"};
-
 Json point_of(const Json& record) {
     Json p{{"hash", record["hash"]}, {"status", record["status"]}, {"command", command_of(record)}};
     if (record["status"] != "done") return p["reason"] = record.value("reason", ""), p;
@@ -96,7 +61,7 @@ Json point_of(const Json& record) {
     p["width"] = record["width"], p["height"] = record["height"];
     p["volume"] = record["volume"]["name"];
     const Json& cost = record["cost"];
-    for (const char* name : kCostNames)
+    for (const char* name : kCostFigures)
         if (cost.contains(name)) p["cost"][name] = cost[name];  // old records have fewer
     for (const auto& [stage, figures] : cost["stages"].items())
         p["stages"][stage] = {figures["word_bits"], figures["multiplier_bits"]};
@@ -156,185 +121,6 @@ void add_what_was_not_measured(Json& data, const Json& sweep, const Json& points
     const auto failed =
         std::count_if(points.begin(), points.end(), [](const Json& p) { return p["status"] == "failed"; });
     if (failed > 0) lines.push_back(fmt::format("{} points failed: the table has their reasons.", failed));
-}
-
-// The indices of points that no other beats in both `cost` and error.
-std::set<std::size_t> pareto_front(const Json& data) {
-    std::vector<std::tuple<double, double, std::size_t>> all;
-    for (std::size_t i = 0; i < data["points"].size(); ++i) {
-        const Json& p = data["points"][i];
-        if (p["status"] != "done" || p["error"].empty()) continue;
-        const Json& first = p["error"].begin().value();
-        all.emplace_back(p["cost"]["bits"].get<double>(), first["color"]["rmse"].get<double>(), i);
-    }
-    std::sort(all.begin(), all.end());
-    std::set<std::size_t> front;
-    double best = INFINITY;
-    for (const auto& [cost, error, i] : all)
-        if (error < best) best = error, front.insert(i);
-    return front;
-}
-
-std::string base64(const std::string& bytes) {
-    static constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    std::string out;
-    out.reserve((bytes.size() + 2) / 3 * 4);
-    for (std::size_t i = 0; i < bytes.size(); i += 3) {
-        unsigned word = 0;
-        for (std::size_t k = 0; k < 3; ++k)
-            word = word << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
-        for (int k = 0; k < 4; ++k)
-            out += static_cast<std::size_t>(k) <= bytes.size() - i ? kDigits[word >> (18 - 6 * k) & 63] : '=';
-    }
-    return out;
-}
-
-std::string deflated(const std::string& text) {
-    uLongf size = compressBound(text.size());
-    std::string packed(size, '\0');
-    if (compress2(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(text.data()),
-                  text.size(), 6) != Z_OK)
-        throw std::bad_alloc();
-    packed.resize(size);
-    return packed;
-}
-
-/// Pictures by name; those not `in_full` are shrunk until all fit.
-class Pictures {
-  public:
-    explicit Pictures(std::int64_t room) : room_(room) {}
-    void add(const std::string& name, const std::string& path, bool in_full) {
-        std::string bytes = bytes_of(path);
-        if (!bytes.empty() && names_.insert(name).second) all_.push_back({name, std::move(bytes), in_full});
-    }
-    struct Packed {
-        Json index = Json::object();  // name -> width, height, stride, and its place in `text`
-        std::string text;             // base64, one after the other
-    };
-    Packed packed() {
-        std::int64_t full = 0, rest = 0;
-        for (const Item& item : all_)
-            (item.in_full ? full : rest) += static_cast<std::int64_t>(item.bytes.size()) * 4 / 3;
-        // The area allowed to each picture that is not kept in full.
-        const double left =
-            std::max<double>(static_cast<double>(room_ - full), static_cast<double>(room_) / 4);
-        const double keep = rest > 0 ? std::min(1.0, left / static_cast<double>(rest)) : 1;
-        Packed packed;
-        for (const Item& item : all_) append(packed, item, item.in_full ? 1 : keep);
-        return packed;
-    }
-
-  private:
-    struct Item {
-        std::string name, bytes;
-        bool in_full;
-    };
-    static void append(Packed& to, const Item& item, double keep) {
-        std::string kept = item.bytes;
-        if (keep < 1) {
-            const Image image = read_values(item.bytes);
-            const double side = std::max(image.width, image.height) * std::sqrt(keep);
-            kept = values_file(image, std::max(24, static_cast<int>(side)), 9);
-        }
-        int width = 0, height = 0, stride = 0;
-        std::sscanf(kept.c_str(), "squint.values/1 %d %d %d", &width, &height, &stride);
-        const std::string text = base64(kept.substr(kept.find('\n') + 1));
-        to.index[item.name] = {{"w", width},
-                               {"h", height},
-                               {"s", keep < 1 ? stride : 1},
-                               {"at", to.text.size()},
-                               {"size", text.size()}};
-        to.text += text;
-    }
-    std::int64_t room_;
-    std::vector<Item> all_;
-    std::set<std::string> names_;
-};
-
-void replace_once(std::string& text, std::string_view what, const std::string& with) {
-    const std::size_t at = text.find(what);
-    if (at == std::string::npos) throw InputError(fmt::format("report: the page lacks {}", what));
-    text.replace(at, what.size(), with);
-}
-
-std::string escaped_html(const std::string& text) {
-    std::string out;
-    for (const char c : text)
-        out += c == '<'   ? "&lt;"
-               : c == '>' ? "&gt;"
-               : c == '&' ? "&amp;"
-               : c == '"' ? "&quot;"
-                          : std::string(1, c);
-    return out;
-}
-
-// ------------------------------------------------------------------------------------------ tables
-
-std::string cell_text(const Json& value) {
-    if (value.is_null()) return "";
-    if (value.is_string()) return value.get<std::string>();
-    if (value.is_number_float()) return fmt::format("{:.6g}", value.get<double>());
-    return value.dump();
-}
-
-struct Column {
-    std::string name;
-    std::vector<std::string> cells;
-};
-std::vector<Column> columns_of(const Json& data) {
-    std::vector<Column> columns;
-    const Json &points = data["points"], &entries = data["entries"];
-    const auto add = [&](const std::string& name, auto&& value) {
-        Column column{name, {}};
-        bool any = false;
-        for (const Json& entry : entries) {
-            const Json& point = points[entry["point"].get<std::size_t>()];
-            column.cells.push_back(cell_text(value(entry, point)));
-            any |= !column.cells.back().empty();
-        }
-        if (any) columns.push_back(std::move(column));
-    };
-    const auto at = [](const Json& json, std::initializer_list<const char*> path) {
-        const Json* here = &json;
-        for (const char* name : path) {
-            if (!here->is_object() || !here->contains(name)) return Json();
-            here = &(*here)[name];
-        }
-        return *here;
-    };
-    for (const auto& [axis, values] : data["axes"].items())
-        add(axis, [&, axis = axis](const Json& entry, const Json&) {
-            return at(entry, {"values", axis.c_str()});
-        });
-    add("varied", [&](const Json& entry, const Json&) { return at(entry, {"varied"}); });
-    add("status", [&](const Json&, const Json& point) { return point["status"]; });
-    for (const Json& against : data["against"]) {
-        const std::string name = against.get<std::string>();
-        for (const char* channel : {"color", "alpha", "color_srgb"})
-            for (const char* figure : {"max", "rmse", "bias", "psnr", "ssim"})
-                add(fmt::format("{} {} {}", name, channel, figure), [&](const Json&, const Json& point) {
-                    return at(point, {"error", name.c_str(), channel, figure});
-                });
-    }
-    add("ms", [&](const Json&, const Json& point) { return at(point, {"ms"}); });
-    for (const char* name : {"path", "samples"})
-        add(name, [&](const Json&, const Json& point) { return at(point, {name}); });
-    for (const char* name : kCostNames)
-        add(name, [&](const Json&, const Json& point) { return at(point, {"cost", name}); });
-    add("C - A above 0", [&](const Json&, const Json& point) { return at(point, {"color_above_alpha"}); });
-    add("C + T - 1 least", [&](const Json&, const Json& point) {
-        return at(point, {"conservation", "least_lsb8"});
-    });
-    add("C + T - 1 most", [&](const Json&, const Json& point) {
-        return at(point, {"conservation", "most_lsb8"});
-    });
-    add("stuck samples", [&](const Json&, const Json& point) {
-        return at(point, {"stuck", "stuck_samples"});
-    });
-    add("picture hash", [&](const Json&, const Json& point) { return at(point, {"picture_hash"}); });
-    add("reason", [&](const Json&, const Json& point) { return at(point, {"reason"}); });
-    add("command", [&](const Json&, const Json& point) { return at(point, {"command"}); });
-    return columns;
 }
 
 }  // namespace
@@ -403,93 +189,6 @@ Json report_data(const std::string& run, double most_error) {
     data["runs"] = std::move(runs);
     data["version"] = version();
     return data;
-}
-
-std::string report_csv(const Json& data) {
-    const std::vector<Column> columns = columns_of(data);
-    const auto field = [](const std::string& text) {
-        if (text.find_first_of(",\"\n") == std::string::npos) return text;
-        std::string out = "\"";
-        for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
-        return out + '"';
-    };
-    std::string text;
-    for (std::size_t c = 0; c < columns.size(); ++c) text += (c ? "," : "") + field(columns[c].name);
-    text += "\n";
-    for (std::size_t row = 0; row < data["entries"].size(); ++row) {
-        for (std::size_t c = 0; c < columns.size(); ++c)
-            text += (c ? "," : "") + field(columns[c].cells[row]);
-        text += "\n";
-    }
-    return text;
-}
-
-std::string report_markdown(const Json& data) {
-    std::string text = fmt::format("# {}\n\n", data["title"].get<std::string>());
-    text += "**" + data["answer"]["text"].get<std::string>() + "**\n\n";
-    if (const std::string note = data["note"]; !note.empty()) text += note + "\n\n";
-    std::vector<Column> columns = columns_of(data);
-    std::erase_if(columns, [](const Column& c) {  // a page has a limited width
-        return c.name == "command" || c.name == "picture hash" || c.name.ends_with("_bits") ||
-               c.name.ends_with("_sample") || c.name.ends_with("bias") || c.name == "buffer_bytes" ||
-               c.name == "samples";
-    });
-    const auto field = [](std::string cell) {
-        for (std::size_t at = 0; (at = cell.find('|', at)) != std::string::npos; at += 2)
-            cell.insert(at, "\\");
-        return cell;
-    };
-    text += "|";
-    for (const Column& column : columns) text += " " + field(column.name) + " |";
-    text += "\n|";
-    for (std::size_t c = 0; c < columns.size(); ++c) text += "---|";
-    text += "\n";
-    for (std::size_t row = 0; row < data["entries"].size(); ++row) {
-        text += "|";
-        for (const Column& column : columns) text += " " + field(column.cells[row]) + " |";
-        text += "\n";
-    }
-    text += "\nErrors in 1/255 of full scale, over the foreground; PSNR in dB, peak 1.\n\nNot measured:\n\n";
-    for (const Json& line : data["not_measured"]) text += "- " + line.get<std::string>() + "\n";
-    for (const Json& run : data["runs"])
-        text +=
-            fmt::format("\n`{}`: {}, {} processors, squint {}, {:.1f} s\n", run["command"].get<std::string>(),
-                        run["machine"]["cpu"].get<std::string>(), run["machine"]["processors"].get<int>(),
-                        run["version"].get<std::string>(), run["seconds"].get<double>());
-    return text;
-}
-
-std::string report_html(const Json& data, const std::string& run, std::int64_t most_picture_bytes) {
-    const std::set<std::size_t> front = pareto_front(data);
-    Pictures pictures(most_picture_bytes);
-    const Json& points = data["points"];
-    for (std::size_t i = 0; i < points.size() && !run.empty(); ++i) {
-        const std::string hash = points[i]["hash"];
-        pictures.add(hash, run + "/pictures/" + hash + ".values", i == 0 || front.contains(i));
-        if (points[i].contains("baselines"))
-            for (const auto& [name, key] : points[i]["baselines"].items())
-                pictures.add(key.get<std::string>(), run + "/baselines/" + key.get<std::string>() + ".values",
-                             true);
-    }
-    const Pictures::Packed packed = pictures.packed();
-    // Most of it is audits' counts, which are read when somebody looks at them.
-    Json whole = data, audits = Json::object();
-    whole["pictures"] = packed.index;
-    for (Json& point : whole["points"])
-        if (point.contains("audit")) {
-            audits[point["hash"].get<std::string>()] = std::move(point["audit"]);
-            point["audit"] = true;
-        }
-    const auto text = [](const Json& json) {
-        return base64(deflated(json.dump(-1, ' ', true, Json::error_handler_t::replace)));
-    };
-    std::string page(report_page());
-    replace_once(page, "@PICTURES@", packed.text);
-    replace_once(page, "@AUDITS@", text(audits));
-    replace_once(page, "@DATA@", text(whole));
-    for (const char* place : {"@HEADING@", "@TITLE@"})
-        replace_once(page, place, escaped_html(data["title"].get<std::string>()));
-    return page;
 }
 
 }  // namespace squint::sweep

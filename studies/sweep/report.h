@@ -3,6 +3,7 @@
 
 #include "studies/sweep/evaluate.h"
 
+#include <array>
 #include <cstdint>
 #include <string>
 
@@ -10,6 +11,30 @@ namespace squint::sweep {
 
 /// The bound of an answer where none is asked for: half an LSB8, which 8-bit output loses anyway.
 inline constexpr double kHalfLsb8 = 0.5;
+
+/// What of a point's cost a report tells.
+inline constexpr std::array kCostFigures{"bits",
+                                         "word_bits",
+                                         "multiplier_bits",
+                                         "divider_bits",
+                                         "rounding_bits",
+                                         "constant_multiplier_bits",
+                                         "lookups",
+                                         "lookup_bits",
+                                         "mean_bits",
+                                         "mean_multiplier_bits",
+                                         "mean_divider_bits",
+                                         "mean_rounding_bits",
+                                         "mean_constant_multiplier_bits",
+                                         "mean_lookups",
+                                         "mean_lookup_bits",
+                                         "table_bits",
+                                         "table_bytes",
+                                         "pixel_bits",
+                                         "buffer_bytes",
+                                         "voxel_bytes_per_sample",
+                                         "voxel_bytes_per_lit_sample",
+                                         "entry_bytes_per_sample"};
 
 /// All data of a report but pictures (docs/sweeps.md, "The report's data").  Its answer is the cheapest point
 /// within `most_error` LSB8 or a search's own bound.  Throws InputError when `run` is no run.
