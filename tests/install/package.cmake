@@ -1,15 +1,7 @@
 # Makes the Debian packages and unpacks them into an empty root: the program renders from there, and what it needs is named.
 # cmake -DBUILD= -P package.cmake
-set(room ${BUILD}/package-test)
-file(REMOVE_RECURSE ${room})
-file(MAKE_DIRECTORY ${room})
-function(run)
-  execute_process(COMMAND ${ARGV} RESULT_VARIABLE code OUTPUT_VARIABLE out ERROR_VARIABLE out WORKING_DIRECTORY ${room})
-  if(NOT code EQUAL 0)
-    message(FATAL_ERROR "${ARGV}\n${out}")
-  endif()
-  set(output "${out}" PARENT_SCOPE)
-endfunction()
+set(room package-test)
+include(${CMAKE_CURRENT_LIST_DIR}/in_a_room.cmake)
 
 run(${CMAKE_CPACK_COMMAND} -G DEB --config ${BUILD}/CPackConfig.cmake -B ${room})
 file(GLOB program ${room}/squint_*.deb)

@@ -1,20 +1,13 @@
 # Installs this build into an empty folder, builds examples/ against it and runs what comes out.
 # cmake -DBUILD= -DSOURCE= -DTYPE= -DCOMPILER= -P run.cmake
-set(room ${BUILD}/install-test)
-file(REMOVE_RECURSE ${room})
-function(run)
-  execute_process(COMMAND ${ARGV} RESULT_VARIABLE code OUTPUT_VARIABLE out ERROR_VARIABLE out WORKING_DIRECTORY ${BUILD})
-  if(NOT code EQUAL 0)
-    message(FATAL_ERROR "${ARGV}\n${out}")
-  endif()
-  set(output "${out}" PARENT_SCOPE)
-endfunction()
+set(room install-test)
+include(${CMAKE_CURRENT_LIST_DIR}/in_a_room.cmake)
 
 run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${room}/prefix)
 run(${CMAKE_COMMAND} -S ${SOURCE}/examples -B ${room}/example -G Ninja -DCMAKE_BUILD_TYPE=${TYPE}
     -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_PREFIX_PATH=${room}/prefix)
 run(${CMAKE_COMMAND} --build ${room}/example)
-run(${CMAKE_COMMAND} -E chdir ${room} ${room}/example/minimal)
+run(${room}/example/minimal)
 if(NOT output MATCHES "minimal.exr: T is u[0-9.]+ [a-z_]+ [a-z]+, [0-9.]+ dB over [1-9][0-9]* pixels")
   message(FATAL_ERROR "minimal said: ${output}")
 endif()

@@ -1,0 +1,11 @@
+# An empty folder, `room`, and run(COMMAND...) in it: what the command prints is `output`; a failure ends the test.
+set(room ${BUILD}/${room})
+file(REMOVE_RECURSE ${room})
+file(MAKE_DIRECTORY ${room})
+function(run)
+  execute_process(COMMAND ${ARGV} RESULT_VARIABLE code OUTPUT_VARIABLE out ERROR_VARIABLE out WORKING_DIRECTORY ${room})
+  if(NOT code EQUAL 0)
+    message(FATAL_ERROR "${ARGV}\n${out}")
+  endif()
+  set(output "${out}" PARENT_SCOPE)
+endfunction()
