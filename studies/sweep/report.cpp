@@ -152,7 +152,7 @@ Json report_data(const std::string& run, double most_error) {
         const std::string hash = entry["hash"];
         const auto [at, is_new] = index.try_emplace(hash, points.size());
         if (is_new) {
-            const std::string path = run + "/points/" + hash + ".json";
+            const std::string path = point_path(run, hash);
             std::error_code ignored;
             if (!fs::exists(path, ignored)) {
                 index.erase(at), missing.insert(hash);

@@ -149,14 +149,14 @@ std::string escaped_html(const std::string& text) {
 std::string report_html(const Json& data, const std::string& run, std::int64_t most_picture_bytes) {
     const std::set<std::size_t> front = pareto_front(data);
     Pictures pictures(most_picture_bytes);
+    const auto add = [&](const char* room, const std::string& name, bool in_full) {
+        pictures.add(name, fmt::format("{}/{}/{}.values", run, room, name), in_full);
+    };
     const Json& points = data["points"];
     for (std::size_t i = 0; i < points.size() && !run.empty(); ++i) {
-        const std::string hash = points[i]["hash"];
-        pictures.add(hash, run + "/pictures/" + hash + ".values", i == 0 || front.contains(i));
+        add("pictures", points[i]["hash"], i == 0 || front.contains(i));
         if (points[i].contains("baselines"))
-            for (const auto& [name, key] : points[i]["baselines"].items())
-                pictures.add(key.get<std::string>(), run + "/baselines/" + key.get<std::string>() + ".values",
-                             true);
+            for (const auto& [name, key] : points[i]["baselines"].items()) add("baselines", key, true);
     }
     const Pictures::Packed packed = pictures.packed();
     // Most of it is audits' counts, which are read when somebody looks at them.

@@ -94,9 +94,9 @@ struct PrefixTables {
         if (i == j) return inside_one_entry(i, u, v, rate, count);
         const bool ascending = front < back;
         Moments result = inside_one_entry(i, u, ascending ? 1 : 0, rate, count);
-        Moments between = ascending ? whole(i + 1, j, true) : whole(j + 1, i, false);
-        between.stretch(std::abs(rate), count);
-        result.append(between, count);
+        Moments whole_part = ascending ? whole(i + 1, j, true) : whole(j + 1, i, false);
+        whole_part.stretch(std::abs(rate), count);
+        result.append(whole_part, count);
         result.append(inside_one_entry(j, ascending ? 0 : 1, v, rate, count), count);
         return result;
     }
