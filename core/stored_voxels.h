@@ -1,5 +1,5 @@
-// Reads the voxels of a file one by one, in the order of x, y, z: of any type, byte order and order of axes.  Only for
-// volume_stored.cpp.
+// Reads the voxels of a file in the order of x, y, z, whatever their type, byte order and order of axes.
+// Only volume_stored.cpp includes it.
 #pragma once
 
 #include "core/parallel.h"

@@ -22,8 +22,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace squint::HWY_NAMESPACE {
 
-/// The voxels of a volume.  Fetching is separate from arithmetic: stages receive voxels and do not index the
-/// volume.
+/// The voxels of a volume.  Fetching is separate from arithmetic: stages receive voxels and index no volume.
 struct FromVolume {
     const Volume& volume;
 

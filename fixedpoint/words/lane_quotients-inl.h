@@ -119,7 +119,8 @@ HWY_INLINE auto nearest_whole(V x) {
     const auto whole = hn::Set(hn::DFromV<V>(), FloatOf<T>(sizeof(T) == 4 ? 0x1.8p23 : 0x1.8p52));
     return hn::Sub(hn::BitCast(d, hn::Add(x, whole)), hn::BitCast(d, whole));
 }
-inline constexpr bool kRoundsOnce = HWY_NATIVE_FMA != 0;  // a multiply-add
+// A multiply-add rounds once.
+inline constexpr bool kRoundsOnce = HWY_NATIVE_FMA != 0;
 /// scaled / denominator as whole doubles, from the denominator's inverse.  An estimate, off by an eighth at most where
 /// results have 48 bits, is corrected by its exact remainder.  Without multiply-adds that round once, its products
 /// have at most 53 bits (split_quotient.h; range.cpp notes it).

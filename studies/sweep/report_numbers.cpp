@@ -1,7 +1,5 @@
 // A report as a table, for programs (CSV) and for papers (Markdown).
-#include "pipeline/record.h"
 #include "studies/sweep/report.h"
-#include "studies/sweep/run_folder.h"
 
 #include <fmt/format.h>
 

@@ -1,7 +1,6 @@
 // A report as one page, which asks for nothing from a network.
 #include "core/error.h"
 #include "studies/sweep/report.h"
-#include "studies/sweep/run_folder.h"
 
 #include <fmt/format.h>
 #include <zlib.h>

@@ -1,4 +1,5 @@
-# An empty folder, `room`, and run(COMMAND...) in it: what the command prints is `output`; a failure ends the test.
+# Makes `room` an empty folder of the build, and run(COMMAND...) runs in it.  `output` is what the command prints; a
+# failure ends the test.
 set(room ${BUILD}/${room})
 file(REMOVE_RECURSE ${room})
 file(MAKE_DIRECTORY ${room})

@@ -84,8 +84,8 @@ struct PrefixTables {
     /// Moments of the fractions u0 -> u1 of entry i at a signed rate: integrated, without prefixes.
     Moments inside_one_entry(int i, double u0, double u1, double rate, int count) const;
 
-    /// Moments of a slab, front != back: of the fractions of entries at its ends, and between them of
-    /// `whole(lo, hi, ascending)`, from entry lo to entry hi or back, at a rate of one.
+    /// Moments of a slab, front != back.  The fractions of entries at its ends are integrated; between them
+    /// whole(lo, hi, ascending) gives the moments from entry lo to entry hi, or back, at a rate of one.
     template <class Whole>
     Moments joined(double front, double back, double length, int count, const Whole& whole) const {
         const double rate = length / (back - front);

@@ -6,6 +6,7 @@
 #include "tests/pipeline/machines/kernel_cases.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <memory>
